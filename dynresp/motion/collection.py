@@ -1,0 +1,130 @@
+"""Collections: named sets of public motion files that are fetched together.
+
+They are read from the files that need them, so that a collection cannot go stale.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from dynresp.errors import SpecError, UnknownNameError
+from dynresp.motion.catalogue import SourceFile, load_sources
+from dynresp.motion.sources import MOTION_SUFFIXES, checked_relative_path
+from dynresp.paths import examples_folder, reactions_folder
+
+COLLECTIONS: Mapping[str, str] = {
+    "core": "what reactions/core.toml and the example experiments use",
+    "full": "core, and what reactions/full.toml uses",
+    "all": "every file in reactions/sources.csv",
+}
+"""Names of the collections, the smallest first, and what each holds."""
+
+
+def collection_files(
+    name: str,
+    sources: Mapping[str, SourceFile] | None = None,
+    *,
+    reactions: Path | None = None,
+    examples: Path | None = None,
+) -> list[SourceFile]:
+    """List what a collection holds: clips, the skeletons they need, and the licence texts.
+
+    "core" and "full" hold every motion file that the library files name, as `files_named_in`
+    finds them.
+
+    Args:
+        name: A name in `COLLECTIONS`.
+        sources: The known source files; by default the shipped table.
+        reactions: Folder of `core.toml` and `full.toml`; by default the shipped one.
+        examples: Folder of the example experiments; by default the shipped one.
+
+    Returns:
+        Source files, sorted by path.
+
+    Raises:
+        UnknownNameError: There is no such collection.
+        SpecError: A library file is missing or damaged, or names a motion file that the source
+            table does not know.
+    """
+    if name not in COLLECTIONS:
+        raise UnknownNameError("collection", name, COLLECTIONS)
+    sources = load_sources() if sources is None else sources
+    if name == "all":
+        return [sources[file] for file in sorted(sources)]
+    reactions = reactions or reactions_folder()
+    libraries = [reactions / "core.toml", *sorted((examples or examples_folder()).glob("*.toml"))]
+    if name == "full":
+        libraries.append(reactions / "full.toml")
+    wanted: set[str] = set()
+    for library in libraries:
+        for file in files_named_in(library):
+            if file not in sources:
+                raise SpecError(
+                    f"{library} names the motion file {file!r}, which is not in the source "
+                    "table; correct the name or add a row to reactions/sources.csv."
+                )
+            wanted.add(file)
+    return _with_companions(wanted, sources)
+
+
+def files_named_in(library: Path) -> set[str]:
+    """Collect the motion files that a reaction library or experiment names.
+
+    These are the texts under keys `file` or `motion`, at any depth, that end with the suffix of
+    a motion file. Names without one are built-in motions, which need no fetching.
+
+    Args:
+        library: A TOML file.
+
+    Returns:
+        Paths inside a motions folder, with forward slashes.
+
+    Raises:
+        SpecError: The file is missing, cannot be read, is not TOML, or names a path that leads
+            out of a motions folder.
+    """
+    try:
+        content = tomllib.loads(library.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(
+            f"the library {library} cannot be read ({error}); a collection of motion files is "
+            "made from it. Restore the file or install dynresp again."
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"{library} is not valid TOML: {error}.") from error
+    named: set[str] = set()
+    for text in _texts_under(content, ("file", "motion")):
+        if PurePosixPath(text).suffix.lower() in MOTION_SUFFIXES:
+            try:
+                named.add(checked_relative_path(text))
+            except SpecError as error:
+                raise SpecError(f"{library}: {error}") from None
+    return named
+
+
+def _with_companions(files: set[str], sources: Mapping[str, SourceFile]) -> list[SourceFile]:
+    """Add the skeletons of AMC clips and the licence texts of all repositories involved."""
+    skeletons = {sources[file].skeleton for file in files} - {None}
+    repos = {sources[file].source_repo for file in files}
+    return [
+        source
+        for file, source in sorted(sources.items())
+        if file in files
+        or file in skeletons
+        or (source.kind == "licence" and source.source_repo in repos)
+    ]
+
+
+def _texts_under(content: Any, keys: tuple[str, ...]) -> Iterator[str]:
+    if isinstance(content, dict):
+        for key, value in content.items():
+            if key in keys and isinstance(value, str):
+                yield value
+            else:
+                yield from _texts_under(value, keys)
+    elif isinstance(content, list):
+        for value in content:
+            yield from _texts_under(value, keys)
