@@ -1,0 +1,319 @@
+"""From any person's skeleton to the character, with its feet on the floor.
+
+Each body of the character takes the turn of the source's segment away from the source's rest pose,
+after the two rest poses have been laid over each other (the sources rest with the arms out, the
+character with hanging arms). The root and the ankles keep the source's path, scaled by leg length,
+so that a foot that stands in the source stands here too although thigh and shank have other
+lengths. What then still hovers over the floor or sinks into it is set on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.motion import legs, rotations
+from dynresp.motion.character import ROOT, Character, default_character
+from dynresp.motion.ground import clearances, foot_contacts
+from dynresp.motion.motion import FEET, Motion
+from dynresp.motion.readers.skeleton import SkeletonMotion
+from dynresp.motion.rotations import FloatArray
+from dynresp.motion.segments import Segments, find_segments
+
+_DOWN = np.array([0.0, 0.0, -1.0])
+_UP = np.array([0.0, 0.0, 1.0])
+# Sine of the least flexion (25 degrees) at which a limb shows the plane in which it bends.
+_BENT = 0.42
+
+
+@dataclass(frozen=True)
+class RetargetConfig:
+    """How the feet and the body are set on the floor.
+
+    Attributes:
+        flat_floor: Whether the source stood on level ground; if not (stairs, terrain,
+            playgrounds), only its lowest footing is put at height 0 and nothing else is moved.
+        rest_tilt_deg: A source whose trunk or thighs lean further than this in its rest pose does
+            not rest upright; it is then told from its straightest frame instead.
+        standing_speed: A foot slower than this [m/s] counts when the floor is looked for.
+        pull_down: A standing foot is pulled down to the floor from at most this height [m].
+        ramp_s: Time over which a foot is eased onto the floor and off it [s].
+        sink: How deep a body other than a foot may press into the floor [m].
+    """
+
+    flat_floor: bool = True
+    rest_tilt_deg: float = 35.0
+    standing_speed: float = 0.25
+    pull_down: float = 0.04
+    ramp_s: float = 0.12
+    sink: float = 0.01
+
+
+def retarget(
+    skeleton: SkeletonMotion,
+    character: Character | None = None,
+    config: RetargetConfig | None = None,
+) -> Motion:
+    """Lay a skeleton's motion onto the character.
+
+    Args:
+        skeleton: The source.
+        character: The character, by default the product's.
+        config: How to set it on the floor.
+
+    Returns:
+        A motion with the source's frames, rate and name, and foot contacts found.
+
+    Raises:
+        MotionError: The skeleton is not a person's.
+    """
+    character = character or default_character()
+    config = config or RetargetConfig()
+    segments = find_segments(skeleton)
+    skeleton = _upright_rest(skeleton, segments, config.rest_tilt_deg)
+    poses, ankles = _follow(skeleton, segments, character)
+    poses = legs.place_ankles(character, poses, ankles)
+    poses = settle(character, poses, skeleton.fps, config)
+    states = character.kinematics(poses)
+    contacts = foot_contacts(character, states, skeleton.fps)
+    return Motion(poses, skeleton.fps, skeleton.name, contacts)
+
+
+def _upright_rest(skeleton: SkeletonMotion, segments: Segments, tilt_deg: float) -> SkeletonMotion:
+    """The same motion, told from an upright pose if its own rest pose is none."""
+
+    def tilts(points: FloatArray) -> FloatArray:
+        """Angles [rad] of trunk, thighs and shanks from the vertical, (frames, 5)."""
+        bones = [points[:, segments.chest] - points[:, segments.pelvis]]
+        for limb in segments.limbs.values():
+            bones += [points[:, limb["hip"]] - points[:, limb["knee"]]]
+            bones += [points[:, limb["knee"]] - points[:, limb["ankle"]]]
+        stacked = np.stack(bones, axis=1)
+        across = np.linalg.norm(stacked[..., :2], axis=-1)
+        return np.arctan2(across, stacked[..., 2])
+
+    if np.degrees(tilts(skeleton.rest_positions()[None])).max() <= tilt_deg:
+        return skeleton
+    straightest = int(np.argmin(tilts(skeleton.joint_positions()).sum(axis=1)))
+    return skeleton.with_rest(skeleton.rotations[straightest])
+
+
+def _follow(
+    skeleton: SkeletonMotion, segments: Segments, character: Character
+) -> tuple[FloatArray, FloatArray]:
+    """Poses (frames, 59) that turn as the source does, and where its ankles go (frames, 2, 3)."""
+    rest = skeleton.rest_positions()
+    across = rest[segments.limbs["left"]["hip"]] - rest[segments.limbs["right"]["hip"]]
+    # At rest the source faces this way: left to right crossed with up.
+    forward = rotations.from_yaw(np.arctan2(-across[0], across[1]))
+
+    world = np.empty((skeleton.frames, len(character.body_names), 4))
+
+    def follow(body: str, joint: int, correction: FloatArray | None = None) -> None:
+        turn = forward if correction is None else rotations.multiply(correction, forward)
+        world[:, character.body(body)] = rotations.multiply(skeleton.rotations[:, joint], turn)
+
+    follow("pelvis", segments.pelvis)
+    follow("chest", segments.chest)
+    follow("head", segments.head)
+    if segments.abdomen is None:
+        pelvis, chest = (world[:, character.body(name)] for name in ("pelvis", "chest"))
+        world[:, character.body("abdomen")] = rotations.slerp(pelvis, chest, np.array(0.5))
+    else:
+        follow("abdomen", segments.abdomen)
+    for side, limb in segments.limbs.items():
+        for body, start, end in (
+            ("upper_arm", "shoulder", "elbow"),
+            ("forearm", "elbow", "wrist"),
+            ("thigh", "hip", "knee"),
+            ("shank", "knee", "ankle"),
+        ):
+            bone = rest[limb[end]] - rest[limb[start]]
+            follow(f"{side}_{body}", limb[start], rotations.between_vectors(_DOWN, bone))
+        toes = rest[limb["toe"]] - rest[limb["ankle"]]
+        toes = rotations.rotate(rotations.conjugate(forward), toes)
+        # Feet point where the toes do; how far the sole is below the ankle, the source cannot say.
+        toe_out = np.arctan2(toes[1], toes[0]) if np.hypot(toes[0], toes[1]) > 0.01 else 0.0
+        follow(f"{side}_foot", limb["ankle"], rotations.from_yaw(np.clip(toe_out, -0.6, 0.6)))
+
+    _straighten_hinges(world, character)
+
+    points = skeleton.joint_positions()
+    scale = _leg_length(character) / _source_leg_length(rest, segments)
+    poses = np.empty((skeleton.frames, 59))
+    hips = [points[:, segments.limbs[side]["hip"]] for side in FEET]
+    poses[:, ROOT] = scale * np.mean(hips, axis=0)
+    poses[:, 3:] = character.local_rotations(world).reshape(skeleton.frames, -1)
+    ankles = np.stack([points[:, segments.limbs[side]["ankle"]] for side in FEET], axis=1)
+    return poses, scale * ankles
+
+
+def _straighten_hinges(world: FloatArray, character: Character) -> None:
+    """Turn upper arms and thighs about their own axes so that elbows and knees bend as hinges do.
+
+    Where the zero of such turns lies is a matter of each source's calibration, and differs by 30
+    degrees and more. One constant turn of the upper part, chosen so that over the whole motion the
+    forearm bends forward and the shank backward, and one of the lower part, chosen so that it is
+    not twisted on average, make motions of different sources comparable.
+
+    Args:
+        world: (frames, 14, 4) orientations of the bodies; changed in place.
+        character: The character.
+    """
+    for side in FEET:
+        for upper, lower, forward in (("upper_arm", "forearm", 1.0), ("thigh", "shank", -1.0)):
+            above, below = character.body(f"{side}_{upper}"), character.body(f"{side}_{lower}")
+            joint = rotations.multiply(rotations.conjugate(world[:, above]), world[:, below])
+            bend = forward * rotations.rotate(joint, _DOWN)[:, :2]
+            # A nearly straight limb shows no bending plane.
+            bent = bend[np.linalg.norm(bend, axis=1) > _BENT]
+            if len(bent):
+                x, y = bent.sum(axis=0)
+                turn = rotations.about_axis(_UP, np.arctan2(y, x))
+                world[:, above] = rotations.multiply(world[:, above], turn)
+                joint = rotations.multiply(rotations.conjugate(turn), joint)
+            # What twist is left between the two, on average, is calibration as well.
+            twist = rotations.yaw_of(joint)
+            mean = np.arctan2(np.sin(twist).sum(), np.cos(twist).sum())
+            untwist = rotations.about_axis(_UP, -mean)
+            world[:, below] = rotations.multiply(world[:, below], untwist)
+
+
+def _leg_length(character: Character) -> float:
+    """Hip to knee to ankle [m]."""
+    bodies = [character.body("left_shank"), character.body("left_foot")]
+    return float(np.linalg.norm(character.offsets[bodies], axis=1).sum())
+
+
+def _source_leg_length(rest: FloatArray, segments: Segments) -> float:
+    lengths = [
+        np.linalg.norm(rest[limb[a]] - rest[limb[b]])
+        for limb in segments.limbs.values()
+        for a, b in (("hip", "knee"), ("knee", "ankle"))
+    ]
+    return float(np.sum(lengths) / 2.0)
+
+
+def settle(
+    character: Character, poses: FloatArray, fps: float, config: RetargetConfig | None = None
+) -> FloatArray:
+    """Put a motion on the floor.
+
+    First the floor is found where slow feet are, and put at height 0. Then the root is raised,
+    smoothly, where a body other than a foot would be deeper in the floor than it may. Last, the
+    legs are bent or stretched so that feet that stand touch the floor and no foot is below it.
+
+    Args:
+        character: The character.
+        poses: (frames, 59).
+        fps: Frame rate [1/s].
+        config: How.
+
+    Returns:
+        (frames, 59).
+    """
+    config = config or RetargetConfig()
+    poses = np.array(poses)
+    feet = [character.body(f"{side}_foot") for side in FEET]
+    states = character.kinematics(poses)
+    low = clearances(character, states)
+    poses[:, 2] -= _floor_height(legs.ankle_positions(character, states), low[:, feet], fps, config)
+    if not config.flat_floor:
+        return poses
+
+    states = character.kinematics(poses)
+    low = clearances(character, states)
+    others = np.setdiff1d(np.arange(low.shape[1]), feet)
+    lift = _smooth_cover(np.maximum(0.0, -config.sink - low[:, others].min(axis=1)), fps, config)
+    contacts = foot_contacts(character, states, fps)
+    poses[:, 2] += lift
+    # The root's rise does not concern feet that stand.
+    sole = low[:, feet] + lift[:, None]
+    weight = np.stack([_smooth_cover(c.astype(float), fps, config) for c in contacts.T], axis=1)
+    shift = np.maximum(weight * np.maximum(-sole, -(config.pull_down + lift[:, None])), -sole)
+    ankles = legs.ankle_positions(character, character.kinematics(poses))
+    ankles[..., 2] += np.where(sole > 0.0, np.minimum(shift, 0.0), shift)
+    return legs.place_ankles(character, poses, ankles)
+
+
+def _floor_height(
+    ankles: FloatArray, soles: FloatArray, fps: float, config: RetargetConfig
+) -> float:
+    """Height of the floor [m] in a motion's own coordinates: where slow feet stand."""
+    if len(ankles) < 2:
+        return float(soles.min())
+    speed = np.linalg.norm(np.gradient(ankles, 1.0 / fps, axis=0), axis=-1)
+    slow = speed < config.standing_speed
+    lowest = soles.argmin(axis=1)
+    chosen = slow[np.arange(len(soles)), lowest]
+    heights = soles.min(axis=1)
+    if not chosen.any():
+        return float(np.quantile(heights, 0.05))
+    # Lying and sitting people hold their feet up: only the lower half of the footings counts.
+    standing = heights[chosen]
+    return float(np.median(standing[standing <= np.median(standing) + 1e-9]))
+
+
+def _smooth_cover(values: FloatArray, fps: float, config: RetargetConfig) -> FloatArray:
+    """A smooth curve on or above the values: the highest within the ramp, then averaged over it."""
+    half = max(1, round(config.ramp_s * fps))
+    padded = np.pad(values, 2 * half, mode="edge")
+    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1).max(axis=1)
+    kernel = np.hanning(2 * half + 3)[1:-1]
+    return np.convolve(highest, kernel / kernel.sum(), mode="valid")
+
+
+def t_pose_frames(character: Character, motion: Motion) -> npt.NDArray[np.bool_]:
+    """Frames (frames,) in which the character stands straight with both arms held out.
+
+    Sources begin and end with such a pose to calibrate; it is no motion of anybody.
+    """
+    states = character.kinematics(motion.poses)
+    down = np.ones(len(motion), dtype=bool)
+    for side in FEET:
+        sign = 1.0 if side == "left" else -1.0
+        chest = states.quaternions[:, character.body("chest")]
+        outward = rotations.rotate(chest, np.array([0.0, sign, 0.0]))
+        for part, limit in (("upper_arm", 25.0), ("forearm", 30.0)):
+            bone = rotations.rotate(states.quaternions[:, character.body(f"{side}_{part}")], _DOWN)
+            cosine = np.clip(np.sum(bone * outward, axis=-1), -1.0, 1.0)
+            down &= np.degrees(np.arccos(cosine)) < limit
+        thigh = rotations.rotate(states.quaternions[:, character.body(f"{side}_thigh")], _UP)
+        down &= thigh[:, 2] > np.cos(np.radians(20.0))
+    return down
+
+
+def trim_t_poses(character: Character, motion: Motion, lead_s: float = 0.4) -> Motion:
+    """Cut off T-poses at the start and the end, and the time it takes to leave or enter them.
+
+    Args:
+        character: The character.
+        motion: Any motion.
+        lead_s: Time [s] that is cut beyond the T-pose itself, while the arms go down or up.
+
+    Returns:
+        The rest of the motion; the motion itself where it has no T-pose at its ends. A motion
+        that is nothing else but a T-pose is returned whole.
+    """
+    flags = t_pose_frames(character, motion)
+    if not flags.any() or flags.all():
+        return motion
+    lead = round(lead_s * motion.fps)
+    near = max(1, round(0.5 * motion.fps))
+    start, stop = 0, len(motion)
+    if flags[:near].any():
+        start = _run_end(flags, near) + lead
+    if flags[-near:].any():
+        stop = len(motion) - _run_end(flags[::-1], near) - lead
+    if stop - start < 2:
+        return motion
+    return replace(motion.slice(start, stop), name=motion.name)
+
+
+def _run_end(flags: npt.NDArray[np.bool_], near: int) -> int:
+    """One past the last flag of the first run of flags, which begins within the first `near`."""
+    first = int(np.argmax(flags[:near]))
+    after = np.flatnonzero(~flags[first:])
+    return first + int(after[0]) if len(after) else len(flags)
