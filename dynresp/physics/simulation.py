@@ -1,0 +1,415 @@
+"""Hits simulated in batches: the approach, the contact, the look-ahead, and the rest after a rewind.
+
+All simulations advance frame by frame on `mujoco.batch.Batch`, whose threads run the steps inside
+a frame; Python only hands over a frame's controls. The state at every frame is kept, so that any
+simulation can be taken back to any frame, bitwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from mujoco.batch import Batch
+
+from dynresp.motion import rotations
+from dynresp.motion.character import JOINTS, POSE_SIZE, ROOT, ROOT_QUAT, VELOCITY_SIZE
+from dynresp.motion.motion import pose_velocities
+from dynresp.motion.rotations import FloatArray
+from dynresp.physics.impacts import WAIT_S, PreparedImpact, push_profile, sphere_inertia
+from dynresp.physics.scene import HOLD_LEAD_S, STRIKE_LEAD_S, ImpactorKind, Scene
+
+_STATE = mujoco.mjtState
+# What is set anew before every step, in the order in which MuJoCo packs it.
+_CONTROL_PARTS = (
+    _STATE.mjSTATE_CTRL,
+    _STATE.mjSTATE_XFRC_APPLIED,
+    _STATE.mjSTATE_EQ_ACTIVE,
+    _STATE.mjSTATE_MOCAP_POS,
+    _STATE.mjSTATE_MOCAP_QUAT,
+)
+# A contact sensor's numbers: found, force (3), position (3).
+_SENSOR_SIZE = 7
+
+
+@dataclass(frozen=True)
+class Setup:
+    """One simulation to be.
+
+    Attributes:
+        base: (frames, 59) the base motion from the simulation's first frame on, at its frame
+            rate. After its last frame the last pose holds.
+        impact: What hits.
+        name: For messages.
+    """
+
+    base: FloatArray
+    impact: PreparedImpact
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The first contact between impactor and character.
+
+    Attributes:
+        time_s: Since the simulation's first frame [s].
+        frame: First frame at or after the contact.
+        body: Name of the body that was hit.
+        force: Contact force in the step of contact [N]; of a push, its peak.
+        point: (3,) where [m], world.
+    """
+
+    time_s: float
+    frame: int
+    body: str
+    force: float
+    point: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """A simulation that blew up.
+
+    Attributes:
+        frame: Frame in which it did.
+        warning: MuJoCo's name for what went wrong.
+    """
+
+    frame: int
+    warning: str
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What one simulation did, frame by frame.
+
+    Attributes:
+        poses: (frames, 59); frame 0 is the setup's first frame.
+        velocities: (frames, 45) rows of `qvel`.
+        impactor: (frames, 7) pose of the ball, fist or striking arm; None for a push.
+        contact: The first contact; None where the impact missed.
+        diverged: Set where the simulation blew up; the frames are those before it.
+    """
+
+    poses: FloatArray
+    velocities: FloatArray
+    impactor: FloatArray | None
+    contact: Contact | None
+    diverged: Divergence | None
+
+
+class Simulation:
+    """Many hits of one kind, simulated together; each is bitwise what it would be alone."""
+
+    def __init__(self, scene: Scene, setups: Sequence[Setup], threads: int = 0) -> None:
+        """Put every character and impactor where it starts.
+
+        Args:
+            scene: The world; its kind is that of all impacts.
+            setups: The simulations.
+            threads: Threads to step them on, 0 for all cores.
+        """
+        self.scene = scene
+        self.setups = list(setups)
+        self.fps = scene.config.fps
+        self.substeps = scene.config.substeps
+        mujoco.set_mju_user_warning(_ignore_warning)
+        self._batch = Batch(scene.model, len(self.setups), threads)
+        self._control_spec = int(sum(int(part) for part in _CONTROL_PARTS))
+        self._columns = self._control_columns()
+        self._set_impactors()
+        self._set_start()
+        # One row of integration state for each frame that has been reached, per simulation.
+        self._states: list[list[FloatArray]] = [[] for _ in self.setups]
+        self._contacts: list[Contact | None] = [None] * len(self.setups)
+        self._diverged: list[Divergence | None] = [None] * len(self.setups)
+
+    # -- setting up ---------------------------------------------------------------------------
+
+    def _control_columns(self) -> dict[int, slice]:
+        columns, start = {}, 0
+        for part in _CONTROL_PARTS:
+            size = mujoco.mj_stateSize(self.scene.model, int(part))
+            columns[int(part)] = slice(start, start + size)
+            start += size
+        self._control_size = start
+        return columns
+
+    def _set_impactors(self) -> None:
+        """Mass, size and weight of each simulation's ball or fist."""
+        if self.scene.kind is not ImpactorKind.PROJECTILE:
+            return
+        model = self.scene.model
+        geom = model.geom("impactor/ball").id
+        body = model.body("impactor/ball").id
+        radius = np.array([s.impact.radius for s in self.setups])
+        mass = np.array([s.impact.mass for s in self.setups])
+        self._batch.expand("geom_size")[:, geom, 0] = radius
+        self._batch.expand("geom_rbound")[:, geom] = radius
+        self._batch.expand("body_mass")[:, body] = mass
+        inertia = np.array([sphere_inertia(m, r) for m, r in zip(mass, radius, strict=True)])
+        self._batch.expand("body_inertia")[:, body] = inertia[:, None]
+        weightless = np.array([float(s.impact.weightless) for s in self.setups])
+        self._batch.expand("body_gravcomp")[:, body] = weightless
+        self._batch.set_const()
+
+    def _set_start(self) -> None:
+        qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        for i, setup in enumerate(self.setups):
+            qpos[i, :POSE_SIZE] = setup.base[0]
+            qvel[i, :VELOCITY_SIZE] = pose_velocities(setup.base[:2], self.fps)[0]
+            if setup.impact.impactor_pose is not None:
+                qpos[i, POSE_SIZE:] = setup.impact.impactor_pose
+                qvel[i, VELOCITY_SIZE:] = setup.impact.impactor_velocity
+
+    def contact(self, i: int) -> Contact | None:
+        """First contact of a simulation that has been run, None where there was none."""
+        return self._contacts[i]
+
+    # -- running ------------------------------------------------------------------------------
+
+    def look_ahead(self, horizon_s: float) -> list[Trace]:
+        """Run every simulation from its start until a given time after its first contact.
+
+        Until contact the pelvis is held to the base motion; the servos track the base motion all
+        the time. A simulation whose impactor touches nothing until `WAIT_S` after it was due ends
+        there, without contact.
+
+        Args:
+            horizon_s: Time to go on after the first contact [s].
+
+        Returns:
+            A trace for each setup.
+        """
+        horizon = int(np.ceil(horizon_s * self.fps - 1e-9))
+        due = [int(np.ceil((s.impact.due_s + WAIT_S) * self.fps)) for s in self.setups]
+        for i in range(len(self.setups)):
+            self._states[i] = [self._batch.state[i].copy()]
+        frame = 0
+        while True:
+            running = []
+            for i in range(len(self.setups)):
+                contact = self._contacts[i]
+                last = due[i] if contact is None else contact.frame + horizon
+                if frame < last and self._diverged[i] is None:
+                    running.append(i)
+            if not running:
+                break
+            self._advance_approach(np.array(running), frame)
+            frame += 1
+        return [self._trace(i) for i in range(len(self.setups))]
+
+    def _advance_approach(self, ids: npt.NDArray[np.intp], frame: int) -> None:
+        """Run one frame; where the first contact falls into it, let the pelvis go from there."""
+        targets = [self.setups[i].base for i in ids]
+        held = np.array([self._contacts[i] is None for i in ids])
+        controls = self._controls(ids, [frame] * len(ids), targets, [frame] * len(ids))
+        controls[~held, :, self._hold_column()] = 0.0
+        record = ("sensordata",) if self.scene.model.nsensordata else ()
+        found = self._run(ids, controls, record, frame)
+        first = self._first_contacts(ids, held, found.get("sensordata"), frame)
+        if first:
+            rows = np.array(sorted(first))
+            for row in rows:
+                controls[row, first[row] :, self._hold_column()] = 0.0
+            again = ids[rows]
+            self._batch.state[again] = [self._states[i][frame] for i in again]
+            self._run(again, controls[rows], (), frame)
+        for i in ids:
+            self._keep(i)
+
+    def follow(
+        self, ids: Sequence[int], frames: Sequence[int], targets: Sequence[FloatArray], length: int
+    ) -> list[Trace]:
+        """Take simulations back to earlier frames and go on from there along new targets.
+
+        Args:
+            ids: Which simulations.
+            frames: The frame to take each back to, bitwise; its later frames are forgotten.
+            targets: For each, (frames, 59) poses to track, the first for the frame gone back to.
+                After the last, the last holds.
+            length: Frames to run.
+
+        Returns:
+            For each, the whole trace from the setup's first frame.
+        """
+        rows = np.asarray(ids)
+        for i, frame in zip(rows, frames, strict=True):
+            del self._states[i][frame + 1 :]
+            self._batch.state[i] = self._states[i][frame]
+            self._diverged[i] = None
+        for step in range(length):
+            alive = [k for k, i in enumerate(rows) if self._diverged[i] is None]
+            if not alive:
+                break
+            running = rows[alive]
+            now = [frames[k] + step for k in alive]
+            controls = self._controls(
+                running, now, [targets[k] for k in alive], [step] * len(alive)
+            )
+            controls[:, :, self._hold_column()] = 0.0
+            self._run(running, controls, (), now[0])
+            for i in running:
+                self._keep(i)
+        return [self._trace(int(i)) for i in rows]
+
+    def _run(
+        self,
+        ids: npt.NDArray[np.intp],
+        controls: FloatArray,
+        record: tuple[str, ...],
+        frame: int,
+    ) -> dict[str, npt.NDArray[np.float64]]:
+        before = self._batch.warning[ids].copy()
+        result = self._batch.rollout(
+            self.substeps, controls, self._control_spec, record=record, ids=ids
+        )
+        rose = self._batch.warning[ids] > before
+        for row in np.flatnonzero(rose.any(axis=1)):
+            kind = mujoco.mjtWarning(int(np.argmax(rose[row]))).name.removeprefix("mjWARN_")
+            self._diverged[ids[row]] = Divergence(frame, kind)
+        return result  # type: ignore[no-any-return]
+
+    def _keep(self, i: int) -> None:
+        """Remember the state after a frame, unless the simulation blew up in it."""
+        if self._diverged[i] is None:
+            self._states[i].append(self._batch.state[i].copy())
+
+    # -- controls -----------------------------------------------------------------------------
+
+    def _hold_column(self) -> int:
+        return self._columns[int(_STATE.mjSTATE_EQ_ACTIVE)].start + self.scene.hold_weld
+
+    def _controls(
+        self,
+        ids: npt.NDArray[np.intp],
+        frames: Sequence[int],
+        targets: Sequence[FloatArray],
+        target_frames: Sequence[int],
+    ) -> FloatArray:
+        """What acts on each simulation in the steps of one frame, (n, substeps, controls).
+
+        Args:
+            ids: Which simulations.
+            frames: The frame that each is in, counted from its start.
+            targets: Poses to track for each.
+            target_frames: Where each is in its targets.
+        """
+        controls = np.zeros((len(ids), self.substeps, self._control_size))
+        steps = np.arange(self.substeps) / self.substeps
+        lead = self.scene.config.servo.lead_s * self.fps
+        ctrl = controls[:, :, self._columns[int(_STATE.mjSTATE_CTRL)]]
+        wrench = controls[:, :, self._columns[int(_STATE.mjSTATE_XFRC_APPLIED)]]
+        welds = controls[:, :, self._columns[int(_STATE.mjSTATE_EQ_ACTIVE)]]
+        place = controls[:, :, self._columns[int(_STATE.mjSTATE_MOCAP_POS)]]
+        turn = controls[:, :, self._columns[int(_STATE.mjSTATE_MOCAP_QUAT)]]
+        welds[:] = 1.0
+        for row, i in enumerate(ids):
+            target, at = targets[row], target_frames[row]
+            # The servo normalises its target, so a straight line between two poses will do.
+            ctrl[row] = _between(target[:, JOINTS], at + steps + lead)
+            held = at + steps + HOLD_LEAD_S * self.fps
+            place[row, :, :3] = _between(target[:, ROOT], held)
+            turn[row, :, :4] = rotations.normalize(_between(target[:, ROOT_QUAT], held))
+            impact = self.setups[i].impact
+            time = (frames[row] + steps) / self.fps
+            if impact.push_force is not None:
+                share = push_profile(time, impact.push_start_s, impact.push_duration_s)
+                column = 6 * (impact.wrench_body + 1)
+                wrench[row, :, column : column + 3] = share[:, None] * impact.push_force
+            if impact.strike_poses is not None:
+                path = impact.strike_poses
+                drawn = frames[row] + steps + STRIKE_LEAD_S * self.fps
+                place[row, :, 3:6] = _between(path[:, :3], drawn)
+                turn[row, :, 4:8] = rotations.normalize(_between(path[:, 3:], drawn))
+        return controls
+
+    # -- contacts -----------------------------------------------------------------------------
+
+    def _first_contacts(
+        self,
+        ids: npt.NDArray[np.intp],
+        held: npt.NDArray[np.bool_],
+        sensors: npt.NDArray[np.float64] | None,
+        frame: int,
+    ) -> dict[int, int]:
+        """Rows whose first contact falls into this frame, with the step in which it does.
+
+        Record k of a rollout belongs to the state before step k.
+        """
+        first: dict[int, int] = {}
+        for row, i in enumerate(ids):
+            if not held[row] or self._diverged[i] is not None:
+                continue
+            impact = self.setups[i].impact
+            if impact.push_force is not None:
+                step = round((impact.push_start_s * self.fps - frame) * self.substeps)
+                if 0 <= step < self.substeps:
+                    body = self.scene.character.body_names[impact.wrench_body]
+                    force = float(np.linalg.norm(impact.push_force))
+                    point = self._body_center(int(i), impact.wrench_body)
+                    self._contacts[i] = self._contact(frame, step, body, force, point)
+                    first[row] = step
+                continue
+            assert sensors is not None
+            touched = sensors[row].reshape(self.substeps, -1, _SENSOR_SIZE)
+            steps = np.flatnonzero(touched[:, :, 0].any(axis=1))
+            if len(steps):
+                step = int(steps[0])
+                forces = np.linalg.norm(touched[step, :, 1:4], axis=1)
+                hit = touched[step, :, 0] > 0
+                which = int(np.argmax(np.where(hit, forces, -1.0)))
+                body = self.scene.contact_bodies[which]
+                self._contacts[i] = self._contact(
+                    frame, step, body, float(forces[which]), touched[step, which, 4:7]
+                )
+                first[row] = step
+        return first
+
+    def _contact(
+        self, frame: int, step: int, body: str, force: float, point: FloatArray
+    ) -> Contact:
+        time = (frame + step / self.substeps) / self.fps
+        x, y, z = (float(value) for value in point)
+        return Contact(time, frame if step == 0 else frame + 1, body, force, (x, y, z))
+
+    def _body_center(self, i: int, body: int) -> FloatArray:
+        pose = self._qpos(self._states[i][-1])[:POSE_SIZE]
+        return self.scene.character.kinematics(pose).centers[0, body]
+
+    # -- results ------------------------------------------------------------------------------
+
+    def _qpos(self, state: FloatArray) -> FloatArray:
+        # Integration state begins with time, qpos, qvel (mjtState's order).
+        return state[..., 1 : 1 + self.scene.model.nq]
+
+    def _trace(self, i: int) -> Trace:
+        states = np.stack(self._states[i])
+        model = self.scene.model
+        qpos = self._qpos(states)
+        qvel = states[:, 1 + model.nq : 1 + model.nq + model.nv]
+        return Trace(
+            qpos[:, :POSE_SIZE].copy(),
+            qvel[:, :VELOCITY_SIZE].copy(),
+            qpos[:, POSE_SIZE:].copy() if model.nq > POSE_SIZE else None,
+            self._contacts[i],
+            self._diverged[i],
+        )
+
+
+def _between(rows: FloatArray, at: FloatArray) -> FloatArray:
+    """Rows at fractional indices, along straight lines; the last row holds after the end."""
+    at = np.minimum(at, len(rows) - 1.0)
+    low = np.minimum(at.astype(np.intp), max(len(rows) - 2, 0))
+    high = np.minimum(low + 1, len(rows) - 1)
+    weight = (at - low)[:, None]
+    return (1.0 - weight) * rows[low] + weight * rows[high]
+
+
+def _ignore_warning(message: str) -> None:
+    """Warnings are read from the batch's counters; MuJoCo would write them to a file here."""
+
