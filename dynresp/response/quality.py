@@ -1,0 +1,151 @@
+"""How good a response is, in numbers. `docs/quality.md` says what each means.
+
+All are taken from the finished motion alone, at its own frame rate (30 fps).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynresp.motion import rotations
+from dynresp.motion.character import Character
+from dynresp.motion.ground import clearances, sole_points
+from dynresp.motion.motion import FEET, Motion
+from dynresp.motion.rotations import FloatArray
+from dynresp.response.respond import Response
+
+# The share of joint speed steps in the motion entered that a seam is measured against.
+_PERCENTILE = 99.9
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Figures of one response. A "seam" is where physics hands over to the blend, or the blend ends.
+
+    Attributes:
+        speed_step_exit: Largest joint speed step at the first seam [rad/s].
+        speed_step_end: The same at the second seam [rad/s].
+        speed_step_reference: 99.9th percentile of the joint speed steps in the motion entered.
+        speed_step_ratio: The larger of the two over the reference.
+        root_jump_m: Largest jump of the root's position at a seam [m].
+        root_jump_deg: Largest jump of the root's orientation at a seam [degrees].
+        foot_skate_m: Way that standing feet slide, from contact to the end, both feet [m].
+        foot_skate_worst_m: The farthest that one foot slides in one stance [m].
+        foot_depth_m: How deep a foot gets into the ground, from contact to the end [m].
+        body_depth_m: How deep any other body gets [m].
+        free_physics_s: Time from contact to the exit [s].
+        physics_s: Time from contact until the blend has ended, while the simulation has a say [s].
+    """
+
+    speed_step_exit: float
+    speed_step_end: float
+    speed_step_reference: float
+    speed_step_ratio: float
+    root_jump_m: float
+    root_jump_deg: float
+    foot_skate_m: float
+    foot_skate_worst_m: float
+    foot_depth_m: float
+    body_depth_m: float
+    free_physics_s: float
+    physics_s: float
+
+
+def measure(response: Response, character: Character) -> Quality | None:
+    """Figures of a response; None where nothing was hit or the simulation diverged."""
+    if response.exit is None or response.end is None or response.contact_frame is None:
+        return None
+    assert response.entered is not None
+    motion = response.motion
+    steps = joint_speed_steps(motion)
+    at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
+    reference = float(np.percentile(joint_speed_steps(response.entered), _PERCENTILE))
+    # The first step of the blend, and the last.
+    jumps = [root_jump(motion, k) for k in (response.exit, response.end - 1)]
+    after = motion.slice(response.contact_frame, len(motion))
+    states = character.kinematics(after.poses)
+    depth = np.maximum(0.0, -clearances(character, states))
+    feet = [character.body(f"{side}_foot") for side in FEET]
+    skates = foot_skates(after, character)
+    return Quality(
+        speed_step_exit=at_seams[0],
+        speed_step_end=at_seams[1],
+        speed_step_reference=reference,
+        speed_step_ratio=max(at_seams) / reference if reference > 0 else float("inf"),
+        root_jump_m=max(jump[0] for jump in jumps),
+        root_jump_deg=max(jump[1] for jump in jumps),
+        foot_skate_m=float(sum(skates)),
+        foot_skate_worst_m=float(max(skates, default=0.0)),
+        foot_depth_m=float(depth[:, feet].max()),
+        body_depth_m=float(np.delete(depth, feet, axis=1).max()),
+        free_physics_s=(response.exit - response.contact_frame) / motion.fps,
+        physics_s=(response.end - response.contact_frame) / motion.fps,
+    )
+
+
+def joint_speed_steps(motion: Motion) -> FloatArray:
+    """Change of each joint's angular velocity from one frame step to the next.
+
+    Returns:
+        (frames - 2, 13) [rad/s]; row k is the change at frame k + 1. As vectors, so a joint that
+        turns about another axis at the same speed counts.
+    """
+    q = motion.joint_quaternions
+    turns = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
+    return np.linalg.norm(np.diff(turns, axis=0), axis=-1) * motion.fps
+
+
+def root_jump(motion: Motion, frame: int) -> tuple[float, float]:
+    """How far the root jumps from a frame to the next, its own movement taken out.
+
+    What the step is more than the mean of the steps before and after it. A smooth movement has
+    none, whatever its speed and acceleration; a shift between the two frames comes out as that
+    shift.
+
+    Args:
+        motion: Any motion.
+        frame: The frame before the step; there must be one frame before it and two after.
+
+    Returns:
+        Position [m] and orientation [degrees].
+    """
+    near = motion.slice(frame - 1, frame + 3)
+    q = near.root_quaternions
+    turns = rotations.to_rotation_vector(rotations.multiply(q[1:], rotations.conjugate(q[:-1])))
+    found = [
+        float(np.linalg.norm(step - 0.5 * (before + after)))
+        for before, step, after in (np.diff(near.root_positions, axis=0), turns)
+    ]
+    return found[0], float(np.degrees(found[1]))
+
+
+def foot_skates(motion: Motion, character: Character) -> list[float]:
+    """How far each foot slides in each of its stances [m].
+
+    The way over the ground of the sole's lowest corner, summed over the steps between frames in
+    both of which the foot stands (`motion.contacts`).
+    """
+    states = character.kinematics(motion.poses)
+    slides = []
+    for i, side in enumerate(FEET):
+        foot = character.body(f"{side}_foot")
+        corners = states.positions[:, foot, None] + rotations.rotate(
+            states.quaternions[:, foot, None], sole_points(character, side)
+        )
+        lowest = corners[:-1, :, 2].argmin(axis=1)
+        rows = np.arange(len(lowest))
+        moved = (corners[1:] - corners[:-1])[rows, lowest, :2]
+        slide = np.linalg.norm(moved, axis=-1)
+        standing = motion.contacts[:-1, i] & motion.contacts[1:, i]
+        total, inside = 0.0, False
+        for stands, way in zip(standing, slide, strict=True):
+            if stands:
+                total, inside = total + float(way), True
+            elif inside:
+                slides.append(total)
+                total, inside = 0.0, False
+        if inside:
+            slides.append(total)
+    return slides

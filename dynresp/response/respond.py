@@ -1,0 +1,379 @@
+"""The whole way of a hit: simulate, choose and align a reaction, and go back to motion capture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dynresp.errors import MotionError
+from dynresp.motion.character import Character
+from dynresp.motion.ground import foot_contacts
+from dynresp.motion.library import ReactionLibrary
+from dynresp.motion.motion import Motion
+from dynresp.motion.rotations import FloatArray
+from dynresp.physics.impacts import Impact, PreparedImpact, prepare
+from dynresp.physics.scene import ImpactorKind, PhysicsConfig, Scene
+from dynresp.physics.simulation import Contact, Divergence, Setup, Simulation, Trace
+from dynresp.response.oracle import OracleResult, search
+from dynresp.response.transition import (
+    TransitionConfig,
+    blend_onto,
+    blended_targets,
+    place_on,
+)
+from dynresp.response.windows import (
+    LibraryWindows,
+    ReactionTrack,
+    WindowErrorConfig,
+    library_windows,
+    make_windows,
+    trace_windows,
+)
+
+CARRY_ON = "carry_on"
+"""Name of the choice to go on with the base motion."""
+
+
+@dataclass(frozen=True)
+class ResponseConfig:
+    """Settings of the whole way.
+
+    Attributes:
+        physics: The simulation.
+        window: The search; its frame rate must be the simulation's.
+        transition: The way back.
+        carry_on_exit_s: Time after contact at which the base motion must fit to be carried on
+            [s]. A window that begins at the contact still shows the base motion after the hardest
+            hit; by 0.2 s a hit has moved the body, and a ragdoll that nothing has hit has not yet
+            lost its balance.
+        carry_on_slack_s: How much earlier or later than by the clock the base motion may then be
+            entered [s].
+        remaining_s: What is left of a reaction where it is entered, at least [s]: the blend, and
+            then enough to be seen.
+    """
+
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    window: WindowErrorConfig = field(
+        # What is known of a hit 0.1 s after it decides the reaction (Zordan et al. 2007, section
+        # 4.1), so no simulation is left before.
+        default_factory=lambda: WindowErrorConfig(fps=30.0, exit_min_s=0.1)
+    )
+    transition: TransitionConfig = field(default_factory=TransitionConfig)
+    carry_on_exit_s: float = 0.2
+    carry_on_slack_s: float = 0.1
+    remaining_s: float = 0.6
+
+    @property
+    def horizon_s(self) -> float:
+        """How long the simulation looks ahead after contact [s]."""
+        return self.window.exit_max_s + self.window.window_s
+
+
+@dataclass(frozen=True)
+class Response:
+    """One answer to one hit. Frames are counted in `motion`.
+
+    Attributes:
+        motion: The one continuous motion: base, physics, blend, reaction.
+        start: First simulated frame.
+        contact: First contact, its times from `start`; None where nothing was hit.
+        contact_frame: First frame at or after contact; None likewise.
+        exit: Frame at which the blend begins; None where there was no contact.
+        end: Frame at which the blend has ended and the reaction goes on alone; None likewise.
+        choice: Name of the reaction chosen, or `CARRY_ON`; None without contact.
+        entry: Frame of the reaction clip that was entered; of the base motion, when carried on.
+        error: Window error of the choice [m].
+        errors: Best window error of every reaction and of `CARRY_ON`.
+        oracle: What the search over the library found; None without contact.
+        carry_on: What the search over the base motion found; None without contact.
+        entered: The motion entered, unplaced: the reaction's clip, or the base motion.
+        impactor: (frames, 7) pose of ball, fist or striking arm, NaN outside the simulation; None
+            for pushes.
+        prepared: The impact in terms of the simulation.
+        diverged: Set where the simulation blew up; the motion then stops at the last good frame.
+    """
+
+    motion: Motion
+    start: int
+    prepared: PreparedImpact
+    contact: Contact | None = None
+    contact_frame: int | None = None
+    exit: int | None = None
+    end: int | None = None
+    choice: str | None = None
+    entry: int | None = None
+    error: float | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    oracle: OracleResult | None = None
+    carry_on: OracleResult | None = None
+    entered: Motion | None = None
+    impactor: FloatArray | None = None
+    diverged: Divergence | None = None
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """What was decided for one simulation; frames of the trace but for the entry."""
+
+    name: str
+    motion: Motion
+    exit: int
+    entry: int
+    error: float
+    oracle: OracleResult
+    carry_on: OracleResult
+
+
+class Responder:
+    """Answers hits on one character with one reaction library."""
+
+    def __init__(
+        self,
+        character: Character,
+        library: ReactionLibrary,
+        config: ResponseConfig | None = None,
+        threads: int = 0,
+    ) -> None:
+        """Cut the library's windows once.
+
+        Args:
+            character: The character.
+            library: Its reactions, at the simulation's frame rate.
+            config: Settings.
+            threads: Threads for the physics, 0 for all cores.
+
+        Raises:
+            MotionError: Library and simulation differ in their frame rate.
+        """
+        self.character = character
+        self.library = library
+        self.config = config or ResponseConfig()
+        self.threads = threads
+        fps = self.config.physics.fps
+        if self.config.window.fps != fps or any(r.motion.fps != fps for r in library.reactions):
+            raise MotionError(f"simulation, search and library must all run at {fps:g} fps")
+        left = round(max(self.config.remaining_s, self.config.transition.blend_s + 2 / fps) * fps)
+        tracks = [
+            self._track(r.name, r.motion.poses, (0, max(1, len(r.motion) - left)))
+            for r in library.reactions
+        ]
+        self.windows: LibraryWindows = library_windows(tracks, self.config.window)
+        self._scenes: dict[ImpactorKind, Scene] = {}
+
+    def respond(
+        self,
+        hits: Sequence[tuple[Motion, Impact]],
+        progress: Callable[[str, int, int], None] | None = None,
+    ) -> list[Response]:
+        """Answer hits, each on its own base motion.
+
+        Args:
+            hits: Base motions (at the simulation's frame rate) and what hits them.
+            progress: Called with the stage, how many are done, and of how many.
+
+        Returns:
+            A response for each hit; one that diverges is marked and takes no other down.
+
+        Raises:
+            SpecError: An impact lies outside its base motion.
+        """
+        tell = progress or (lambda stage, done, of: None)
+        prepared = [
+            prepare(impact, base, self.character, self.config.physics) for base, impact in hits
+        ]
+        responses: list[Response | None] = [None] * len(hits)
+        for kind in ImpactorKind:
+            rows = [i for i, p in enumerate(prepared) if p.kind is kind]
+            if rows:
+                bases = [hits[i][0] for i in rows]
+                done = self._respond_alike(kind, bases, [prepared[i] for i in rows], tell)
+                for i, response in zip(rows, done, strict=True):
+                    responses[i] = response
+        return [response for response in responses if response is not None]
+
+    # -- steps of the way -----------------------------------------------------------------------
+
+    def _respond_alike(
+        self,
+        kind: ImpactorKind,
+        bases: list[Motion],
+        prepared: list[PreparedImpact],
+        tell: Callable[[str, int, int], None],
+    ) -> list[Response]:
+        """Answer hits that all need the same scene."""
+        if kind not in self._scenes:
+            self._scenes[kind] = Scene(self.character, kind, self.config.physics)
+        setups = [
+            Setup(base.poses[p.start :], p) for base, p in zip(bases, prepared, strict=True)
+        ]
+        tell("simulating", 0, len(setups))
+        simulation = Simulation(self._scenes[kind], setups, self.threads)
+        traces = simulation.look_ahead(self.config.horizon_s)
+        tell("simulating", len(setups), len(setups))
+        choices: list[_Choice | None] = []
+        for i, (base, setup, trace) in enumerate(zip(bases, setups, traces, strict=True)):
+            tell("choosing", i, len(setups))
+            hit = trace.contact is not None and trace.diverged is None
+            choices.append(self._choose(base, setup.impact, trace) if hit else None)
+        tell("choosing", len(setups), len(setups))
+        final = self._finish(simulation, choices)
+        return [
+            self._compose(*row) for row in zip(bases, prepared, traces, choices, final, strict=True)
+        ]
+
+    def _track(
+        self, name: str, poses: FloatArray, entries: tuple[int, int] | None = None
+    ) -> ReactionTrack:
+        states = self.character.kinematics(poses)
+        return ReactionTrack(name, states.centers, states.quaternions, entries)
+
+    def _choose(self, base: Motion, prepared: PreparedImpact, trace: Trace) -> _Choice:
+        """The oracle's choice among all reactions and carrying on."""
+        assert trace.contact is not None
+        window = self.config.window
+        states = self.character.kinematics(trace.poses[trace.contact.frame :])
+        cut = trace_windows(states.centers, states.quaternions, window)
+        result = search(cut, self.windows)
+
+        # The base motion around the moment at which it must fit.
+        leave = round(self.config.carry_on_exit_s * base.fps)
+        slack = round(self.config.carry_on_slack_s * base.fps)
+        first = max(0, prepared.start + trace.contact.frame + leave - slack)
+        last = prepared.start + trace.contact.frame + leave + slack
+        poses = base.sample(np.arange(first, last + window.window_frames) / base.fps)
+        own = library_windows([self._track(CARRY_ON, poses)], window)
+        late = make_windows(states.centers, states.quaternions, [leave], window)
+        carry_on = search(late, own)
+
+        best, stay = result.best, carry_on.best
+        if stay.error <= best.error:
+            entry = first + stay.entry_frame
+            return _Choice(CARRY_ON, base, stay.exit_frame, entry, stay.error, result, carry_on)
+        motion = self.library.reaction(best.reaction).motion
+        return _Choice(
+            best.reaction,
+            motion,
+            best.exit_frame,
+            best.entry_frame,
+            best.error,
+            result,
+            carry_on,
+        )
+
+    def _finish(
+        self, simulation: Simulation, choices: Sequence[_Choice | None]
+    ) -> list[Trace | None]:
+        """The rest of each simulation, tracking towards what was chosen, until the blend ends."""
+        length = self.config.transition.blend_frames(simulation.fps)
+        final: list[Trace | None] = [None] * len(choices)
+        groups: dict[int, list[int]] = {}
+        targets: dict[int, FloatArray] = {}
+        frames: dict[int, int] = {}
+        for i, choice in enumerate(choices):
+            if choice is None:
+                continue
+            contact = simulation.contact(i)
+            assert contact is not None
+            exit_frame = contact.frame + choice.exit
+            back = contact.frame if self.config.transition.second_pass else exit_frame
+            lead = exit_frame - back
+            setup = simulation.setups[i]
+            until = np.minimum(np.arange(back, exit_frame + length + 3), len(setup.base) - 1)
+            targets[i] = blended_targets(
+                setup.base[until], choice.motion.poses, choice.entry, lead, lead + length
+            )
+            frames[i] = back
+            groups.setdefault(lead + length, []).append(i)
+        for steps, rows in groups.items():
+            traces = simulation.follow(
+                rows, [frames[i] for i in rows], [targets[i] for i in rows], steps
+            )
+            for i, trace in zip(rows, traces, strict=True):
+                final[i] = trace
+        return final
+
+    def _compose(
+        self,
+        base: Motion,
+        prepared: PreparedImpact,
+        trace: Trace,
+        choice: _Choice | None,
+        final: Trace | None,
+    ) -> Response:
+        """Put base motion, physics, blend and reaction together."""
+        start = prepared.start
+        before = base.poses[:start]
+        if choice is None:
+            # A miss: the base motion goes on as if nothing had been. A divergence: it ends there.
+            poses = base.poses if trace.diverged is None else np.concatenate([before, trace.poses])
+            motion = Motion(poses, base.fps, base.name, contacts=None)
+            return Response(
+                self._with_contacts(motion),
+                start,
+                prepared,
+                trace.contact,
+                impactor=_impactor_track(trace, start, len(motion)),
+                diverged=trace.diverged,
+            )
+        assert trace.contact is not None
+        assert final is not None
+        length = self.config.transition.blend_frames(base.fps)
+        out = trace.contact.frame + choice.exit
+        simulated = final.poses[out : out + length + 1]
+        if final.diverged is not None:
+            motion = Motion(np.concatenate([before, final.poses]), base.fps, base.name)
+            return Response(
+                motion,
+                start,
+                prepared,
+                trace.contact,
+                impactor=_impactor_track(final, start, len(motion)),
+                diverged=final.diverged,
+            )
+        whole = choice.motion.poses
+        entered = whole[choice.entry :]
+        placed = place_on(entered, 0, simulated[0])
+        poses = np.concatenate(
+            [
+                before,
+                final.poses[:out],
+                blend_onto(simulated, placed[: length + 1]),
+                placed[length + 1 :],
+            ]
+        )
+        motion = Motion(poses, base.fps, base.name)
+        errors = {n: float(e) for n, e in zip(choice.oracle.names, choice.oracle.errors, strict=True)}
+        errors[CARRY_ON] = choice.carry_on.best.error
+        return Response(
+            self._with_contacts(motion),
+            start,
+            prepared,
+            trace.contact,
+            start + trace.contact.frame,
+            start + out,
+            start + out + length,
+            choice.name,
+            choice.entry,
+            choice.error,
+            errors,
+            choice.oracle,
+            choice.carry_on,
+            choice.motion,
+            _impactor_track(final, start, len(motion)),
+        )
+
+    def _with_contacts(self, motion: Motion) -> Motion:
+        states = self.character.kinematics(motion.poses)
+        return replace(motion, contacts=foot_contacts(self.character, states, motion.fps))
+
+
+def _impactor_track(trace: Trace, start: int, frames: int) -> FloatArray | None:
+    """The impactor's poses in a motion's frames, NaN where it was not simulated."""
+    if trace.impactor is None:
+        return None
+    track = np.full((frames, 7), np.nan)
+    seen = trace.impactor[: max(0, frames - start)]
+    track[start : start + len(seen)] = seen
+    return track
