@@ -15,7 +15,7 @@ from dynresp.motion.rotations import FloatArray
 
 # Foot order everywhere: left, right.
 FEET = ("left", "right")
-_MAX_FPS = 10_000.0
+_FPS_RANGE = (0.001, 10_000.0)
 _MAX_DISTANCE = 100_000.0  # [m]
 
 
@@ -75,10 +75,7 @@ class Motion:
                 f"motion {self.name!r} goes {farthest:g} m far; "
                 f"its root must stay within {_MAX_DISTANCE:g} m of the origin"
             )
-        if not (np.isfinite(self.fps) and 0 < self.fps <= _MAX_FPS):
-            raise MotionError(
-                f"frame rate must be above 0 and at most {_MAX_FPS:g}, got {self.fps}"
-            )
+        _check_rate(self.fps)
         quaternions = poses[:, 3:].reshape(len(poses), -1, 4)
         quaternions = rotations.make_continuous(rotations.normalize(quaternions))
         poses[:, 3:] = quaternions.reshape(len(poses), POSE_SIZE - 3)
@@ -167,10 +164,9 @@ class Motion:
         still do; one that falls between two frames drops out.
 
         Raises:
-            MotionError: The frame rate is not positive.
+            MotionError: The frame rate is out of bounds.
         """
-        if not 0 < fps <= _MAX_FPS:
-            raise MotionError(f"frame rate must be above 0 and at most {_MAX_FPS:g}, got {fps}")
+        _check_rate(fps)
         if fps == self.fps:
             return self
         count = int(self.duration * fps + 1e-6) + 1
@@ -229,6 +225,12 @@ class Motion:
         turn = yaw - float(rotations.yaw_of(pose[ROOT_QUAT]))
         now = rotations.rotate(rotations.from_yaw(turn), pose[ROOT])
         return self.moved(turn, (x - now[0], y - now[1], 0.0))
+
+
+def _check_rate(fps: float) -> None:
+    lowest, highest = _FPS_RANGE
+    if not lowest <= fps <= highest:  # so that NaN fails, too
+        raise MotionError(f"frame rate must be {lowest:g} to {highest:g} per second, got {fps}")
 
 
 def move_poses(poses: FloatArray, yaw: float, translation: npt.ArrayLike) -> FloatArray:

@@ -9,14 +9,15 @@ lengths. What then still hovers over the floor or sinks into it is set on it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion import legs, rotations
 from dynresp.motion.character import ROOT, Character, default_character
-from dynresp.motion.ground import clearances, foot_contacts
+from dynresp.motion.floor import FloorConfig, find_floor, settle
+from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.readers.skeleton import SkeletonMotion
 from dynresp.motion.rotations import FloatArray
@@ -34,21 +35,15 @@ class RetargetConfig:
 
     Attributes:
         flat_floor: Whether the source stood on level ground; if not (stairs, terrain,
-            playgrounds), only its lowest footing is put at height 0 and nothing else is moved.
+            playgrounds), where it mostly stands is put at height 0 and nothing else is moved.
         rest_tilt_deg: A source whose trunk or thighs lean further than this in its rest pose does
             not rest upright; it is then told from its straightest frame instead.
-        standing_speed: A foot slower than this [m/s] counts when the floor is looked for.
-        pull_down: A standing foot is pulled down to the floor from at most this height [m].
-        ramp_s: Time over which a foot is eased onto the floor and off it [s].
-        sink: How deep a body other than a foot may press into the floor [m].
+        floor: How it is set on the floor.
     """
 
     flat_floor: bool = True
     rest_tilt_deg: float = 35.0
-    standing_speed: float = 0.25
-    pull_down: float = 0.04
-    ramp_s: float = 0.12
-    sink: float = 0.01
+    floor: FloorConfig = field(default_factory=FloorConfig)
 
 
 def retarget(
@@ -75,7 +70,9 @@ def retarget(
     skeleton = _upright_rest(skeleton, segments, config.rest_tilt_deg)
     poses, ankles = _follow(skeleton, segments, character)
     poses = legs.place_ankles(character, poses, ankles)
-    poses = settle(character, poses, skeleton.fps, config)
+    poses[:, 2] -= find_floor(character, poses, skeleton.fps, config.floor)
+    if config.flat_floor:
+        poses = settle(character, poses, skeleton.fps, config.floor)
     states = character.kinematics(poses)
     contacts = foot_contacts(character, states, skeleton.fps)
     return Motion(poses, skeleton.fps, skeleton.name, contacts)
@@ -194,75 +191,6 @@ def _source_leg_length(rest: FloatArray, segments: Segments) -> float:
         for a, b in (("hip", "knee"), ("knee", "ankle"))
     ]
     return float(np.sum(lengths) / 2.0)
-
-
-def settle(
-    character: Character, poses: FloatArray, fps: float, config: RetargetConfig | None = None
-) -> FloatArray:
-    """Put a motion on the floor.
-
-    First the floor is found where slow feet are, and put at height 0. Then the root is raised,
-    smoothly, where a body other than a foot would be deeper in the floor than it may. Last, the
-    legs are bent or stretched so that feet that stand touch the floor and no foot is below it.
-
-    Args:
-        character: The character.
-        poses: (frames, 59).
-        fps: Frame rate [1/s].
-        config: How.
-
-    Returns:
-        (frames, 59).
-    """
-    config = config or RetargetConfig()
-    poses = np.array(poses)
-    feet = [character.body(f"{side}_foot") for side in FEET]
-    states = character.kinematics(poses)
-    low = clearances(character, states)
-    poses[:, 2] -= _floor_height(legs.ankle_positions(character, states), low[:, feet], fps, config)
-    if not config.flat_floor:
-        return poses
-
-    states = character.kinematics(poses)
-    low = clearances(character, states)
-    others = np.setdiff1d(np.arange(low.shape[1]), feet)
-    lift = _smooth_cover(np.maximum(0.0, -config.sink - low[:, others].min(axis=1)), fps, config)
-    contacts = foot_contacts(character, states, fps)
-    poses[:, 2] += lift
-    # The root's rise does not concern feet that stand.
-    sole = low[:, feet] + lift[:, None]
-    weight = np.stack([_smooth_cover(c.astype(float), fps, config) for c in contacts.T], axis=1)
-    shift = np.maximum(weight * np.maximum(-sole, -(config.pull_down + lift[:, None])), -sole)
-    ankles = legs.ankle_positions(character, character.kinematics(poses))
-    ankles[..., 2] += np.where(sole > 0.0, np.minimum(shift, 0.0), shift)
-    return legs.place_ankles(character, poses, ankles)
-
-
-def _floor_height(
-    ankles: FloatArray, soles: FloatArray, fps: float, config: RetargetConfig
-) -> float:
-    """Height of the floor [m] in a motion's own coordinates: where slow feet stand."""
-    if len(ankles) < 2:
-        return float(soles.min())
-    speed = np.linalg.norm(np.gradient(ankles, 1.0 / fps, axis=0), axis=-1)
-    slow = speed < config.standing_speed
-    lowest = soles.argmin(axis=1)
-    chosen = slow[np.arange(len(soles)), lowest]
-    heights = soles.min(axis=1)
-    if not chosen.any():
-        return float(np.quantile(heights, 0.05))
-    # Lying and sitting people hold their feet up: only the lower half of the footings counts.
-    standing = heights[chosen]
-    return float(np.median(standing[standing <= np.median(standing) + 1e-9]))
-
-
-def _smooth_cover(values: FloatArray, fps: float, config: RetargetConfig) -> FloatArray:
-    """A smooth curve on or above the values: the highest within the ramp, then averaged over it."""
-    half = max(1, round(config.ramp_s * fps))
-    padded = np.pad(values, 2 * half, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1).max(axis=1)
-    kernel = np.hanning(2 * half + 3)[1:-1]
-    return np.convolve(highest, kernel / kernel.sum(), mode="valid")
 
 
 def t_pose_frames(character: Character, motion: Motion) -> npt.NDArray[np.bool_]:

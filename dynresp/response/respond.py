@@ -9,6 +9,7 @@ import numpy as np
 
 from dynresp.errors import MotionError
 from dynresp.motion.character import Character
+from dynresp.motion.floor import raise_above
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
@@ -335,14 +336,10 @@ class Responder:
         whole = choice.motion.poses
         entered = whole[choice.entry :]
         placed = place_on(entered, 0, simulated[0])
-        poses = np.concatenate(
-            [
-                before,
-                final.poses[:out],
-                blend_onto(simulated, placed[: length + 1]),
-                placed[length + 1 :],
-            ]
-        )
+        blend = blend_onto(simulated, placed[: length + 1])
+        # Halfway between two poses that stand, legs can reach below the floor.
+        blend = raise_above(self.character, blend, base.fps)
+        poses = np.concatenate([before, final.poses[:out], blend, placed[length + 1 :]])
         motion = Motion(poses, base.fps, base.name)
         errors = {n: float(e) for n, e in zip(choice.oracle.names, choice.oracle.errors, strict=True)}
         errors[CARRY_ON] = choice.carry_on.best.error
