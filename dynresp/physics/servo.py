@@ -33,7 +33,13 @@ def _torque_limits() -> Mapping[str, float]:
 
 
 def _stiffness_floors() -> Mapping[str, float]:
-    return MappingProxyType({"knee": 300.0, "ankle": 300.0})
+    return MappingProxyType({"ankle": 300.0})
+
+
+# Part of the damping that the joint has by itself. MuJoCo integrates a joint's own damping
+# implicitly but a saturated servo's explicitly; a servo that damps more than twice what the joint
+# does can then drive a light turn, such as a thigh's about its own axis, to and fro.
+_PASSIVE_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -44,8 +50,8 @@ class ServoConfig:
         frequency: Natural frequency [rad/s]; stiffness is the inertia felt times its square
             (Zordan et al. 2007, section 6.1: inertia-scaled PD servos).
         damping_ratio: 1 is critical.
-        stiffness_floors: Least stiffness [N m/rad] by joint without its side. What a knee or an
-            ankle moves is light, but they also carry the body: with less, the feet fold.
+        stiffness_floors: Least stiffness [N m/rad] by joint without its side. What an ankle moves
+            is light, but it also carries the body: with less, the feet fold.
         torque_limits: Largest torque [N m] by joint without its side: about what a strong man
             musters, with half as much again, since the servos stand for both sides of a joint.
     """
@@ -55,14 +61,45 @@ class ServoConfig:
     stiffness_floors: Mapping[str, float] = field(default_factory=_stiffness_floors)
     torque_limits: Mapping[str, float] = field(default_factory=_torque_limits)
 
+
+@dataclass(frozen=True)
+class ServoGains:
+    """Gains of all servos, in the order of the joints.
+
+    Attributes:
+        stiffness: (13,) kp [N m/rad].
+        damping: (13,) kv [N m s/rad], the joint's own damping included.
+        torque_limit: (13,) [N m].
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+    torque_limit: FloatArray
+
     @property
-    def lead_s(self) -> float:
-        """How far ahead [s] the target must be read: kv / kp.
+    def lead_s(self) -> FloatArray:
+        """How far ahead (13,) [s] each target must be read: kv / kp.
 
         The damping acts towards standing still; a target that is this much later cancels the lag
         it would cause in a steady movement.
         """
-        return 2.0 * self.damping_ratio / self.frequency
+        return self.damping / self.stiffness
+
+
+def servo_gains(character: Character, config: ServoConfig) -> ServoGains:
+    """Gains for a character: stiffness from inertia and frequency, damping from the ratio.
+
+    The damping is that of the inertia which the joint itself moves, also where a floor has raised
+    the stiffness.
+    """
+    inertia = joint_inertias(character) + character.model.dof_armature[6::3]
+    kinds = [name.split("_")[-1] for name in character.joint_names]
+    floors = np.array([config.stiffness_floors.get(kind, 0.0) for kind in kinds])
+    stiffness = np.maximum(inertia * config.frequency**2, floors)
+    damping = 2.0 * config.damping_ratio * np.sqrt(stiffness * inertia)
+    return ServoGains(
+        stiffness, damping, np.array([config.torque_limits[kind] for kind in kinds])
+    )
 
 
 def joint_inertias(character: Character) -> FloatArray:
@@ -107,14 +144,16 @@ def add_servos(
         config: Frequency, damping, floors and limits.
         prefix: Put before the names of joints and servos.
     """
-    for name, inertia in zip(character.joint_names, joint_inertias(character), strict=True):
-        kind = name.split("_")[-1]
-        stiffness = max(inertia * config.frequency**2, config.stiffness_floors.get(kind, 0.0))
+    gains = servo_gains(character, config)
+    for i, name in enumerate(character.joint_names):
         servo = spec.add_actuator(
             name=prefix + name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=prefix + name
         )
         servo.set_to_orientation(
-            kp=stiffness, kv=stiffness * config.lead_s, ctrlspec=mujoco.mjtCtrlChart.mjCHART_QUAT
+            kp=gains.stiffness[i],
+            kv=(1.0 - _PASSIVE_SHARE) * gains.damping[i],
+            ctrlspec=mujoco.mjtCtrlChart.mjCHART_QUAT,
         )
-        servo.forcerange = (0.0, config.torque_limits[kind])
+        servo.forcerange = (0.0, gains.torque_limit[i])
         servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        spec.joint(prefix + name).damping[0] = _PASSIVE_SHARE * gains.damping[i]

@@ -20,6 +20,7 @@ from dynresp.motion.character import JOINTS, POSE_SIZE, ROOT, ROOT_QUAT, VELOCIT
 from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import WAIT_S, PreparedImpact, push_profile, sphere_inertia
+from dynresp.physics.servo import servo_gains
 from dynresp.physics.scene import HOLD_LEAD_S, STRIKE_LEAD_S, ImpactorKind, Scene
 
 _STATE = mujoco.mjtState
@@ -121,6 +122,8 @@ class Simulation:
         self._batch = Batch(scene.model, len(self.setups), threads)
         self._control_spec = int(sum(int(part) for part in _CONTROL_PARTS))
         self._columns = self._control_columns()
+        gains = servo_gains(scene.character, scene.config.servo)
+        self._lead = gains.lead_s * self.fps
         self._set_impactors()
         self._set_start()
         # One row of integration state for each frame that has been reached, per simulation.
@@ -301,7 +304,6 @@ class Simulation:
         """
         controls = np.zeros((len(ids), self.substeps, self._control_size))
         steps = np.arange(self.substeps) / self.substeps
-        lead = self.scene.config.servo.lead_s * self.fps
         ctrl = controls[:, :, self._columns[int(_STATE.mjSTATE_CTRL)]]
         wrench = controls[:, :, self._columns[int(_STATE.mjSTATE_XFRC_APPLIED)]]
         welds = controls[:, :, self._columns[int(_STATE.mjSTATE_EQ_ACTIVE)]]
@@ -311,7 +313,9 @@ class Simulation:
         for row, i in enumerate(ids):
             target, at = targets[row], target_frames[row]
             # The servo normalises its target, so a straight line between two poses will do.
-            ctrl[row] = _between(target[:, JOINTS], at + steps + lead)
+            joints = target[:, JOINTS].reshape(len(target), -1, 4)
+            ahead = _between(joints, at + steps[:, None] + self._lead)
+            ctrl[row] = ahead.reshape(self.substeps, -1)
             held = at + steps + HOLD_LEAD_S * self.fps
             place[row, :, :3] = _between(target[:, ROOT], held)
             turn[row, :, :4] = rotations.normalize(_between(target[:, ROOT_QUAT], held))
@@ -402,12 +406,23 @@ class Simulation:
 
 
 def _between(rows: FloatArray, at: FloatArray) -> FloatArray:
-    """Rows at fractional indices, along straight lines; the last row holds after the end."""
+    """Rows at fractional indices, along straight lines; the last row holds after the end.
+
+    Args:
+        rows: (frames, n), or (frames, joints, n) where each joint is read at times of its own.
+        at: (steps,), or (steps, joints).
+
+    Returns:
+        (steps, n) or (steps, joints, n).
+    """
     at = np.minimum(at, len(rows) - 1.0)
     low = np.minimum(at.astype(np.intp), max(len(rows) - 2, 0))
     high = np.minimum(low + 1, len(rows) - 1)
-    weight = (at - low)[:, None]
-    return (1.0 - weight) * rows[low] + weight * rows[high]
+    weight = (at - low)[..., None]
+    if at.ndim == 1:
+        return (1.0 - weight) * rows[low] + weight * rows[high]
+    joint = np.arange(at.shape[1])
+    return (1.0 - weight) * rows[low, joint] + weight * rows[high, joint]
 
 
 def _ignore_warning(message: str) -> None:

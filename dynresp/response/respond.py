@@ -51,6 +51,8 @@ class ResponseConfig:
             lost its balance.
         carry_on_slack_s: How much earlier or later than by the clock the base motion may then be
             entered [s].
+        carry_on_s: How long the base motion is shown to go on after a miss or a hit that is
+            carried on through [s].
         remaining_s: What is left of a reaction where it is entered, at least [s]: the blend, and
             then enough to be seen.
     """
@@ -64,6 +66,7 @@ class ResponseConfig:
     transition: TransitionConfig = field(default_factory=TransitionConfig)
     carry_on_exit_s: float = 0.2
     carry_on_slack_s: float = 0.1
+    carry_on_s: float = 2.5
     remaining_s: float = 0.6
 
     @property
@@ -308,8 +311,10 @@ class Responder:
         before = base.poses[:start]
         if choice is None:
             # A miss: the base motion goes on as if nothing had been. A divergence: it ends there.
-            poses = base.poses if trace.diverged is None else np.concatenate([before, trace.poses])
-            motion = Motion(poses, base.fps, base.name, contacts=None)
+            shown = start + len(trace.poses) + round(self.config.carry_on_s * base.fps)
+            missed = trace.diverged is None
+            poses = base.poses[:shown] if missed else np.concatenate([before, trace.poses])
+            motion = Motion(poses, base.fps, base.name)
             return Response(
                 self._with_contacts(motion),
                 start,
@@ -333,8 +338,9 @@ class Responder:
                 impactor=_impactor_track(final, start, len(motion)),
                 diverged=final.diverged,
             )
-        whole = choice.motion.poses
-        entered = whole[choice.entry :]
+        entered = choice.motion.poses[choice.entry :]
+        if choice.name == CARRY_ON:
+            entered = entered[: length + 1 + round(self.config.carry_on_s * base.fps)]
         placed = place_on(entered, 0, simulated[0])
         blend = blend_onto(simulated, placed[: length + 1])
         # Halfway between two poses that stand, legs can reach below the floor.
