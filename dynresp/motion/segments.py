@@ -26,6 +26,7 @@ _LIMB_NAMES = {
     "elbow": ("radius", "forearm", "lowerarm", "lowarm", "elbow"),
     "wrist": ("wrist", "hand"),
 }
+_CHAINS = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 _HEAD_NAMES = ("head", "skull", "neck1", "neck")
 # The part of the way from the hips to the base of the head that the character's abdomen covers
 # ends at 62 % and begins at 25 % (models/ragdoll.xml); its middle tells the joint that moves it.
@@ -113,7 +114,7 @@ def _common_ancestor(skeleton: SkeletonMotion, a: int, b: int) -> int:
 
 
 def _check_chain(skeleton: SkeletonMotion, side: str, limb: dict[str, int]) -> None:
-    for upper, lower in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")):  # fmt: skip
+    for upper, lower in _CHAINS:
         if limb[upper] not in _ancestors(skeleton.parents, limb[lower])[1:]:
             raise MotionError(
                 f"{skeleton.name!r}: took {skeleton.names[limb[upper]]!r} for the {side} {upper} "

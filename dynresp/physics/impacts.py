@@ -289,9 +289,7 @@ def _fist(character: Character, poses: npt.ArrayLike, forearm: int) -> FloatArra
     """Where the middle of the hand is in a pose (3,) [m]."""
     states = character.kinematics(poses)
     hand = character.model.geom(f"{character.body_names[forearm].split('_')[0]}_hand").pos
-    return (
-        states.positions[0, forearm] + rotations.rotate(states.quaternions[0, forearm], hand)
-    )
+    return states.positions[0, forearm] + rotations.rotate(states.quaternions[0, forearm], hand)
 
 
 def sphere_inertia(mass: float, radius: float) -> float:

@@ -46,9 +46,9 @@ class PhysicsConfig:
 
     Attributes:
         fps: Frame rate [1/s] at which it is told what to track, and seen.
-        substeps: Steps of the simulation in a frame. With MuJoCo's `discrete` integrator 8 at 30 fps
-            (4.2 ms) come as close to the limit of small steps as 16 with `implicitfast`, in 0.6 of
-            the time.
+        substeps: Steps of the simulation in a frame. With MuJoCo's `discrete` integrator 8 at
+            30 fps (4.2 ms) come as close to the limit of small steps as 16 with `implicitfast`, in
+            0.6 of the time.
         servo: Gains of the servos.
     """
 
@@ -111,9 +111,7 @@ class Scene:
         spec.attach(other, prefix=IMPACTOR_PREFIX, frame=spec.worldbody.add_frame())
 
     @staticmethod
-    def _weld(
-        spec: mujoco.MjSpec, target: str, body: str, solref: tuple[float, float]
-    ) -> None:
+    def _weld(spec: mujoco.MjSpec, target: str, body: str, solref: tuple[float, float]) -> None:
         """Weld a body to a mocap body so that their frames coincide."""
         weld = spec.add_equality(
             name=target,

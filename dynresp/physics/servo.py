@@ -97,9 +97,7 @@ def servo_gains(character: Character, config: ServoConfig) -> ServoGains:
     floors = np.array([config.stiffness_floors.get(kind, 0.0) for kind in kinds])
     stiffness = np.maximum(inertia * config.frequency**2, floors)
     damping = 2.0 * config.damping_ratio * np.sqrt(stiffness * inertia)
-    return ServoGains(
-        stiffness, damping, np.array([config.torque_limits[kind] for kind in kinds])
-    )
+    return ServoGains(stiffness, damping, np.array([config.torque_limits[kind] for kind in kinds]))
 
 
 def joint_inertias(character: Character) -> FloatArray:
@@ -133,9 +131,7 @@ def _hangs_from(character: Character, body: int, ancestor: int) -> bool:
     return body == ancestor
 
 
-def add_servos(
-    spec: mujoco.MjSpec, character: Character, config: ServoConfig, prefix: str
-) -> None:
+def add_servos(spec: mujoco.MjSpec, character: Character, config: ServoConfig, prefix: str) -> None:
     """Add a servo for each ball joint to a model under construction.
 
     Args:

@@ -1,4 +1,4 @@
-"""Hits simulated in batches: the approach, the contact, the look-ahead, and the rest after a rewind.
+"""Hits simulated in batches: approach, contact, look-ahead, and the rest after a rewind.
 
 All simulations advance frame by frame on `mujoco.batch.Batch`, whose threads run the steps inside
 a frame; Python only hands over a frame's controls. The state at every frame is kept, so that any
@@ -8,99 +8,22 @@ simulation can be taken back to any frame, bitwise.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
-from dynresp.motion import rotations
-from dynresp.motion.character import JOINTS, POSE_SIZE, ROOT, ROOT_QUAT, VELOCITY_SIZE
+from dynresp.motion.character import POSE_SIZE, VELOCITY_SIZE
 from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import WAIT_S, PreparedImpact, push_profile, sphere_inertia
-from dynresp.physics.servo import servo_gains
-from dynresp.physics.scene import HOLD_LEAD_S, STRIKE_LEAD_S, ImpactorKind, Scene
+from dynresp.physics.controls import Controls
+from dynresp.physics.impacts import WAIT_S, sphere_inertia
+from dynresp.physics.scene import ImpactorKind, Scene
+from dynresp.physics.trace import Contact, Divergence, Setup, Trace
 
-_STATE = mujoco.mjtState
-# What is set anew before every step, in the order in which MuJoCo packs it.
-_CONTROL_PARTS = (
-    _STATE.mjSTATE_CTRL,
-    _STATE.mjSTATE_XFRC_APPLIED,
-    _STATE.mjSTATE_EQ_ACTIVE,
-    _STATE.mjSTATE_MOCAP_POS,
-    _STATE.mjSTATE_MOCAP_QUAT,
-)
 # A contact sensor's numbers: found, force (3), position (3).
 _SENSOR_SIZE = 7
-
-
-@dataclass(frozen=True)
-class Setup:
-    """One simulation to be.
-
-    Attributes:
-        base: (frames, 59) the base motion from the simulation's first frame on, at its frame
-            rate. After its last frame the last pose holds.
-        impact: What hits.
-        name: For messages.
-    """
-
-    base: FloatArray
-    impact: PreparedImpact
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Contact:
-    """The first contact between impactor and character.
-
-    Attributes:
-        time_s: Since the simulation's first frame [s].
-        frame: First frame at or after the contact.
-        body: Name of the body that was hit.
-        force: Contact force in the step of contact [N]; of a push, its peak.
-        point: (3,) where [m], world.
-    """
-
-    time_s: float
-    frame: int
-    body: str
-    force: float
-    point: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Divergence:
-    """A simulation that blew up.
-
-    Attributes:
-        frame: Frame in which it did.
-        warning: MuJoCo's name for what went wrong.
-    """
-
-    frame: int
-    warning: str
-
-
-@dataclass(frozen=True)
-class Trace:
-    """What one simulation did, frame by frame.
-
-    Attributes:
-        poses: (frames, 59); frame 0 is the setup's first frame.
-        velocities: (frames, 45) rows of `qvel`.
-        impactor: (frames, 7) pose of the ball, fist or striking arm; None for a push.
-        contact: The first contact; None where the impact missed.
-        diverged: Set where the simulation blew up; the frames are those before it.
-    """
-
-    poses: FloatArray
-    velocities: FloatArray
-    impactor: FloatArray | None
-    contact: Contact | None
-    diverged: Divergence | None
 
 
 class Simulation:
@@ -120,10 +43,7 @@ class Simulation:
         self.substeps = scene.config.substeps
         mujoco.set_mju_user_warning(_ignore_warning)
         self._batch = Batch(scene.model, len(self.setups), threads)
-        self._control_spec = int(sum(int(part) for part in _CONTROL_PARTS))
-        self._columns = self._control_columns()
-        gains = servo_gains(scene.character, scene.config.servo)
-        self._lead = gains.lead_s * self.fps
+        self._controls = Controls(scene)
         self._set_impactors()
         self._set_start()
         # One row of integration state for each frame that has been reached, per simulation.
@@ -132,15 +52,6 @@ class Simulation:
         self._diverged: list[Divergence | None] = [None] * len(self.setups)
 
     # -- setting up ---------------------------------------------------------------------------
-
-    def _control_columns(self) -> dict[int, slice]:
-        columns, start = {}, 0
-        for part in _CONTROL_PARTS:
-            size = mujoco.mj_stateSize(self.scene.model, int(part))
-            columns[int(part)] = slice(start, start + size)
-            start += size
-        self._control_size = start
-        return columns
 
     def _set_impactors(self) -> None:
         """Mass, size and weight of each simulation's ball or fist."""
@@ -208,17 +119,18 @@ class Simulation:
 
     def _advance_approach(self, ids: npt.NDArray[np.intp], frame: int) -> None:
         """Run one frame; where the first contact falls into it, let the pelvis go from there."""
-        targets = [self.setups[i].base for i in ids]
         held = np.array([self._contacts[i] is None for i in ids])
-        controls = self._controls(ids, [frame] * len(ids), targets, [frame] * len(ids))
-        controls[~held, :, self._hold_column()] = 0.0
+        now = [frame] * len(ids)
+        controls = self._controls.pack(
+            [self.setups[i].impact for i in ids], now, [self.setups[i].base for i in ids], now, held
+        )
         record = ("sensordata",) if self.scene.model.nsensordata else ()
         found = self._run(ids, controls, record, frame)
         first = self._first_contacts(ids, held, found.get("sensordata"), frame)
         if first:
             rows = np.array(sorted(first))
             for row in rows:
-                controls[row, first[row] :, self._hold_column()] = 0.0
+                controls[row, first[row] :, self._controls.hold] = 0.0
             again = ids[rows]
             self._batch.state[again] = [self._states[i][frame] for i in again]
             self._run(again, controls[rows], (), frame)
@@ -251,10 +163,13 @@ class Simulation:
                 break
             running = rows[alive]
             now = [frames[k] + step for k in alive]
-            controls = self._controls(
-                running, now, [targets[k] for k in alive], [step] * len(alive)
+            controls = self._controls.pack(
+                [self.setups[i].impact for i in running],
+                now,
+                [targets[k] for k in alive],
+                [step] * len(alive),
+                np.zeros(len(alive)),
             )
-            controls[:, :, self._hold_column()] = 0.0
             self._run(running, controls, (), now[0])
             for i in running:
                 self._keep(i)
@@ -269,68 +184,18 @@ class Simulation:
     ) -> dict[str, npt.NDArray[np.float64]]:
         before = self._batch.warning[ids].copy()
         result = self._batch.rollout(
-            self.substeps, controls, self._control_spec, record=record, ids=ids
+            self.substeps, controls, self._controls.spec, record=record, ids=ids
         )
         rose = self._batch.warning[ids] > before
         for row in np.flatnonzero(rose.any(axis=1)):
             kind = mujoco.mjtWarning(int(np.argmax(rose[row]))).name.removeprefix("mjWARN_")
             self._diverged[ids[row]] = Divergence(frame, kind)
-        return result  # type: ignore[no-any-return]
+        return result
 
     def _keep(self, i: int) -> None:
         """Remember the state after a frame, unless the simulation blew up in it."""
         if self._diverged[i] is None:
             self._states[i].append(self._batch.state[i].copy())
-
-    # -- controls -----------------------------------------------------------------------------
-
-    def _hold_column(self) -> int:
-        return self._columns[int(_STATE.mjSTATE_EQ_ACTIVE)].start + self.scene.hold_weld
-
-    def _controls(
-        self,
-        ids: npt.NDArray[np.intp],
-        frames: Sequence[int],
-        targets: Sequence[FloatArray],
-        target_frames: Sequence[int],
-    ) -> FloatArray:
-        """What acts on each simulation in the steps of one frame, (n, substeps, controls).
-
-        Args:
-            ids: Which simulations.
-            frames: The frame that each is in, counted from its start.
-            targets: Poses to track for each.
-            target_frames: Where each is in its targets.
-        """
-        controls = np.zeros((len(ids), self.substeps, self._control_size))
-        steps = np.arange(self.substeps) / self.substeps
-        ctrl = controls[:, :, self._columns[int(_STATE.mjSTATE_CTRL)]]
-        wrench = controls[:, :, self._columns[int(_STATE.mjSTATE_XFRC_APPLIED)]]
-        welds = controls[:, :, self._columns[int(_STATE.mjSTATE_EQ_ACTIVE)]]
-        place = controls[:, :, self._columns[int(_STATE.mjSTATE_MOCAP_POS)]]
-        turn = controls[:, :, self._columns[int(_STATE.mjSTATE_MOCAP_QUAT)]]
-        welds[:] = 1.0
-        for row, i in enumerate(ids):
-            target, at = targets[row], target_frames[row]
-            # The servo normalises its target, so a straight line between two poses will do.
-            joints = target[:, JOINTS].reshape(len(target), -1, 4)
-            ahead = _between(joints, at + steps[:, None] + self._lead)
-            ctrl[row] = ahead.reshape(self.substeps, -1)
-            held = at + steps + HOLD_LEAD_S * self.fps
-            place[row, :, :3] = _between(target[:, ROOT], held)
-            turn[row, :, :4] = rotations.normalize(_between(target[:, ROOT_QUAT], held))
-            impact = self.setups[i].impact
-            time = (frames[row] + steps) / self.fps
-            if impact.push_force is not None:
-                share = push_profile(time, impact.push_start_s, impact.push_duration_s)
-                column = 6 * (impact.wrench_body + 1)
-                wrench[row, :, column : column + 3] = share[:, None] * impact.push_force
-            if impact.strike_poses is not None:
-                path = impact.strike_poses
-                drawn = frames[row] + steps + STRIKE_LEAD_S * self.fps
-                place[row, :, 3:6] = _between(path[:, :3], drawn)
-                turn[row, :, 4:8] = rotations.normalize(_between(path[:, 3:], drawn))
-        return controls
 
     # -- contacts -----------------------------------------------------------------------------
 
@@ -405,26 +270,5 @@ class Simulation:
         )
 
 
-def _between(rows: FloatArray, at: FloatArray) -> FloatArray:
-    """Rows at fractional indices, along straight lines; the last row holds after the end.
-
-    Args:
-        rows: (frames, n), or (frames, joints, n) where each joint is read at times of its own.
-        at: (steps,), or (steps, joints).
-
-    Returns:
-        (steps, n) or (steps, joints, n).
-    """
-    at = np.minimum(at, len(rows) - 1.0)
-    low = np.minimum(at.astype(np.intp), max(len(rows) - 2, 0))
-    high = np.minimum(low + 1, len(rows) - 1)
-    weight = (at - low)[..., None]
-    if at.ndim == 1:
-        return (1.0 - weight) * rows[low] + weight * rows[high]
-    joint = np.arange(at.shape[1])
-    return (1.0 - weight) * rows[low, joint] + weight * rows[high, joint]
-
-
 def _ignore_warning(message: str) -> None:
     """Warnings are read from the batch's counters; MuJoCo would write them to a file here."""
-

@@ -22,7 +22,9 @@ _PERCENTILE = 99.9
 
 @dataclass(frozen=True)
 class Quality:
-    """Figures of one response. A "seam" is where physics hands over to the blend, or the blend ends.
+    """Figures of one response.
+
+    A "seam" is where physics hands over to the blend, or where the blend ends.
 
     Attributes:
         speed_step_exit: Largest joint speed step at the first seam [rad/s].

@@ -16,7 +16,8 @@ from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Impact, PreparedImpact, prepare
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig, Scene
-from dynresp.physics.simulation import Contact, Divergence, Setup, Simulation, Trace
+from dynresp.physics.simulation import Simulation
+from dynresp.physics.trace import Contact, Divergence, Setup, Trace
 from dynresp.response.oracle import OracleResult, search
 from dynresp.response.transition import (
     TransitionConfig,
@@ -209,9 +210,7 @@ class Responder:
         """Answer hits that all need the same scene."""
         if kind not in self._scenes:
             self._scenes[kind] = Scene(self.character, kind, self.config.physics)
-        setups = [
-            Setup(base.poses[p.start :], p) for base, p in zip(bases, prepared, strict=True)
-        ]
+        setups = [Setup(base.poses[p.start :], p) for base, p in zip(bases, prepared, strict=True)]
         tell("simulating", 0, len(setups))
         simulation = Simulation(self._scenes[kind], setups, self.threads)
         traces = simulation.look_ahead(self.config.horizon_s)
@@ -309,67 +308,53 @@ class Responder:
         """Put base motion, physics, blend and reaction together."""
         start = prepared.start
         before = base.poses[:start]
-        if choice is None:
-            # A miss: the base motion goes on as if nothing had been. A divergence: it ends there.
-            shown = start + len(trace.poses) + round(self.config.carry_on_s * base.fps)
-            missed = trace.diverged is None
-            poses = base.poses[:shown] if missed else np.concatenate([before, trace.poses])
-            motion = Motion(poses, base.fps, base.name)
-            return Response(
-                self._with_contacts(motion),
-                start,
-                prepared,
-                trace.contact,
-                impactor=_impactor_track(trace, start, len(motion)),
-                diverged=trace.diverged,
-            )
+        shown = round(self.config.carry_on_s * base.fps)
+        whole = Response(base, start, prepared, trace.contact)
+        if choice is None or final is None or final.diverged is not None:
+            last = final or trace
+            if last.diverged is None:
+                # A miss: the base motion goes on as if nothing had been.
+                poses = base.poses[: start + len(last.poses) + shown]
+            else:
+                poses = np.concatenate([before, last.poses])
+            motion = self._with_contacts(base, start, poses)
+            track = _impactor_track(last, start, len(motion))
+            return replace(whole, motion=motion, impactor=track, diverged=last.diverged)
+
         assert trace.contact is not None
-        assert final is not None
         length = self.config.transition.blend_frames(base.fps)
         out = trace.contact.frame + choice.exit
         simulated = final.poses[out : out + length + 1]
-        if final.diverged is not None:
-            motion = Motion(np.concatenate([before, final.poses]), base.fps, base.name)
-            return Response(
-                motion,
-                start,
-                prepared,
-                trace.contact,
-                impactor=_impactor_track(final, start, len(motion)),
-                diverged=final.diverged,
-            )
         entered = choice.motion.poses[choice.entry :]
         if choice.name == CARRY_ON:
-            entered = entered[: length + 1 + round(self.config.carry_on_s * base.fps)]
+            entered = entered[: length + 1 + shown]
         placed = place_on(entered, 0, simulated[0])
-        blend = blend_onto(simulated, placed[: length + 1])
         # Halfway between two poses that stand, legs can reach below the floor.
+        blend = blend_onto(simulated, placed[: length + 1])
         blend = raise_above(self.character, blend, base.fps)
         poses = np.concatenate([before, final.poses[:out], blend, placed[length + 1 :]])
-        motion = Motion(poses, base.fps, base.name)
-        errors = {n: float(e) for n, e in zip(choice.oracle.names, choice.oracle.errors, strict=True)}
-        errors[CARRY_ON] = choice.carry_on.best.error
-        return Response(
-            self._with_contacts(motion),
-            start,
-            prepared,
-            trace.contact,
-            start + trace.contact.frame,
-            start + out,
-            start + out + length,
-            choice.name,
-            choice.entry,
-            choice.error,
-            errors,
-            choice.oracle,
-            choice.carry_on,
-            choice.motion,
-            _impactor_track(final, start, len(motion)),
+        found = zip(choice.oracle.names, choice.oracle.errors, strict=True)
+        return replace(
+            whole,
+            motion=self._with_contacts(base, start, poses),
+            contact_frame=start + trace.contact.frame,
+            exit=start + out,
+            end=start + out + length,
+            choice=choice.name,
+            entry=choice.entry,
+            error=choice.error,
+            errors={n: float(e) for n, e in found} | {CARRY_ON: choice.carry_on.best.error},
+            oracle=choice.oracle,
+            carry_on=choice.carry_on,
+            entered=choice.motion,
+            impactor=_impactor_track(final, start, len(poses)),
         )
 
-    def _with_contacts(self, motion: Motion) -> Motion:
-        states = self.character.kinematics(motion.poses)
-        return replace(motion, contacts=foot_contacts(self.character, states, motion.fps))
+    def _with_contacts(self, base: Motion, start: int, poses: FloatArray) -> Motion:
+        """The finished motion; until the simulation starts its foot contacts are the base's."""
+        states = self.character.kinematics(poses[start:])
+        after = foot_contacts(self.character, states, base.fps)
+        return Motion(poses, base.fps, base.name, np.concatenate([base.contacts[:start], after]))
 
 
 def _impactor_track(trace: Trace, start: int, frames: int) -> FloatArray | None:
