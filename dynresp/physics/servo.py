@@ -33,7 +33,7 @@ def _torque_limits() -> Mapping[str, float]:
 
 
 def _stiffness_floors() -> Mapping[str, float]:
-    return MappingProxyType({"ankle": 300.0})
+    return MappingProxyType({"knee": 2000.0, "ankle": 700.0})
 
 
 # Part of the damping that the joint has by itself. MuJoCo integrates a joint's own damping
@@ -50,8 +50,10 @@ class ServoConfig:
         frequency: Natural frequency [rad/s]; stiffness is the inertia felt times its square
             (Zordan et al. 2007, section 6.1: inertia-scaled PD servos).
         damping_ratio: 1 is critical.
-        stiffness_floors: Least stiffness [N m/rad] by joint without its side. What an ankle moves
-            is light, but it also carries the body: with less, the feet fold.
+        stiffness_floors: Least stiffness [N m/rad] by joint without its side. What knees and ankles
+            move is light, but they carry the body. Two ankles must together exceed its weight
+            times the height of its centre of mass (73 kg x 9.81 m/s2 x 0.9 m = 640 N m/rad), or
+            it topples as a pole would; a bent knee that gives lets the other foot stub its toe.
         torque_limits: Largest torque [N m] by joint without its side: about what a strong man
             musters, with half as much again, since the servos stand for both sides of a joint.
     """

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynresp.motion import rotations
-from dynresp.motion.character import Character
+from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.ground import clearances, sole_points
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
@@ -31,8 +31,12 @@ class Quality:
         speed_step_end: The same at the second seam [rad/s].
         speed_step_reference: 99.9th percentile of the joint speed steps in the motion entered.
         speed_step_ratio: The larger of the two over the reference.
-        root_jump_m: Largest jump of the root's position at a seam [m].
-        root_jump_deg: Largest jump of the root's orientation at a seam [degrees].
+        root_jump_m: How far the root departs at a seam, in one frame, from the simulation that it
+            leaves or the reaction that it joins [m].
+        root_jump_deg: The same of its orientation [degrees].
+        root_shake_m: How unsteady the root's own step is at a seam, whatever the reason: a hit
+            that still shakes the body counts as well [m].
+        root_shake_deg: The same of its orientation [degrees].
         foot_skate_m: Way that standing feet slide, from contact to the end, both feet [m].
         foot_skate_worst_m: The farthest that one foot slides in one stance [m].
         foot_depth_m: How deep a foot gets into the ground, from contact to the end [m].
@@ -47,6 +51,8 @@ class Quality:
     speed_step_ratio: float
     root_jump_m: float
     root_jump_deg: float
+    root_shake_m: float
+    root_shake_deg: float
     foot_skate_m: float
     foot_skate_worst_m: float
     foot_depth_m: float
@@ -64,8 +70,14 @@ def measure(response: Response, character: Character) -> Quality | None:
     steps = joint_speed_steps(motion)
     at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
     reference = float(np.percentile(joint_speed_steps(response.entered), _PERCENTILE))
+    assert response.left is not None
+    assert response.joined is not None
+    jumps = [
+        _root_distance(motion.poses[response.exit + 1], response.left),
+        _root_distance(motion.poses[response.end - 1], response.joined),
+    ]
     # The first step of the blend, and the last.
-    jumps = [root_jump(motion, k) for k in (response.exit, response.end - 1)]
+    shakes = [root_shake(motion, k) for k in (response.exit, response.end - 1)]
     after = motion.slice(response.contact_frame, len(motion))
     states = character.kinematics(after.poses)
     depth = np.maximum(0.0, -clearances(character, states))
@@ -78,6 +90,8 @@ def measure(response: Response, character: Character) -> Quality | None:
         speed_step_ratio=max(at_seams) / reference if reference > 0 else float("inf"),
         root_jump_m=max(jump[0] for jump in jumps),
         root_jump_deg=max(jump[1] for jump in jumps),
+        root_shake_m=max(shake[0] for shake in shakes),
+        root_shake_deg=max(shake[1] for shake in shakes),
         foot_skate_m=float(sum(skates)),
         foot_skate_worst_m=float(max(skates, default=0.0)),
         foot_depth_m=float(depth[:, feet].max()),
@@ -99,8 +113,14 @@ def joint_speed_steps(motion: Motion) -> FloatArray:
     return np.linalg.norm(np.diff(turns, axis=0), axis=-1) * motion.fps
 
 
-def root_jump(motion: Motion, frame: int) -> tuple[float, float]:
-    """How far the root jumps from a frame to the next, its own movement taken out.
+def _root_distance(pose: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """Distance [m] and angle [degrees] between the roots of two poses."""
+    angle = rotations.angle_between(pose[ROOT_QUAT], other[ROOT_QUAT])
+    return float(np.linalg.norm(pose[ROOT] - other[ROOT])), float(np.degrees(angle))
+
+
+def root_shake(motion: Motion, frame: int) -> tuple[float, float]:
+    """How unsteady the root's step is from a frame to the next, its smooth movement taken out.
 
     What the step is more than the mean of the steps before and after it. A smooth movement has
     none, whatever its speed and acceleration; a shift between the two frames comes out as that

@@ -48,7 +48,7 @@ class ResponseConfig:
         transition: The way back.
         carry_on_exit_s: Time after contact at which the base motion must fit to be carried on
             [s]. A window that begins at the contact still shows the base motion after the hardest
-            hit; by 0.2 s a hit has moved the body, and a ragdoll that nothing has hit has not yet
+            hit; by 0.25 s a hit has moved the body, and a ragdoll that nothing has hit has not yet
             lost its balance.
         carry_on_slack_s: How much earlier or later than by the clock the base motion may then be
             entered [s].
@@ -65,7 +65,7 @@ class ResponseConfig:
         default_factory=lambda: WindowErrorConfig(fps=30.0, exit_min_s=0.1)
     )
     transition: TransitionConfig = field(default_factory=TransitionConfig)
-    carry_on_exit_s: float = 0.2
+    carry_on_exit_s: float = 0.25
     carry_on_slack_s: float = 0.1
     carry_on_s: float = 2.5
     remaining_s: float = 0.6
@@ -94,6 +94,8 @@ class Response:
         oracle: What the search over the library found; None without contact.
         carry_on: What the search over the base motion found; None without contact.
         entered: The motion entered, unplaced: the reaction's clip, or the base motion.
+        left: (59,) where the simulation was one frame after the exit; None likewise.
+        joined: (59,) where the reaction was one frame before the end; None likewise.
         impactor: (frames, 7) pose of ball, fist or striking arm, NaN outside the simulation; None
             for pushes.
         prepared: The impact in terms of the simulation.
@@ -114,6 +116,8 @@ class Response:
     oracle: OracleResult | None = None
     carry_on: OracleResult | None = None
     entered: Motion | None = None
+    left: FloatArray | None = None
+    joined: FloatArray | None = None
     impactor: FloatArray | None = None
     diverged: Divergence | None = None
 
@@ -347,6 +351,8 @@ class Responder:
             oracle=choice.oracle,
             carry_on=choice.carry_on,
             entered=choice.motion,
+            left=simulated[1],
+            joined=placed[length - 1],
             impactor=_impactor_track(final, start, len(poses)),
         )
 

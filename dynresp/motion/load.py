@@ -1,0 +1,86 @@
+"""One front door for motions: a file of any kind in, a motion of the character out."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+
+from dynresp.errors import MotionError, MotionFileError
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.motion import Motion
+from dynresp.motion.readers import read_motion_file
+from dynresp.motion.readers.npz import read_npz
+from dynresp.motion.retarget import RetargetConfig, retarget, trim_t_poses
+
+# Motions kept in memory; the whole development collection is about 150 MB.
+_KEPT = 64
+
+
+@dataclass(frozen=True)
+class LoadOptions:
+    """What to tell the reader of a file, and what to do with its motion.
+
+    Attributes:
+        unit: Metres per unit of the file; None finds it.
+        up: "x", "y" or "z", the file's axis that points up; None finds it.
+        fps: Frames per second; None takes what the file states.
+        asf: Skeleton file of an AMC file; None looks for it beside the file.
+        flat_floor: Whether the source stood on level ground.
+        trim_t_poses: Cut T-poses off both ends.
+    """
+
+    unit: float | None = None
+    up: str | None = None
+    fps: float | None = None
+    asf: Path | None = None
+    flat_floor: bool = True
+    trim_t_poses: bool = False
+
+
+def load_motion(
+    path: Path, character: Character | None = None, options: LoadOptions | None = None
+) -> Motion:
+    """Read a motion file, lay it onto the character and set it on the floor.
+
+    A file that has been loaded is kept in memory and read again only when it has changed.
+
+    Args:
+        path: A BVH, AMC, DeepMimic or .npz file.
+        character: The character, by default the product's.
+        options: What to tell the reader, and what to do.
+
+    Returns:
+        The motion, at the file's frame rate.
+
+    Raises:
+        MotionFileError: The file cannot be read, or does not hold a person's motion.
+    """
+    character = character or default_character()
+    options = options or LoadOptions()
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError as error:
+        raise MotionFileError(f"{path}: cannot be read ({error.strerror})") from error
+    return _load(path.resolve(), changed, character, options)
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _load(path: Path, changed: int, character: Character, options: LoadOptions) -> Motion:
+    # `changed` is part of the cache's key alone.
+    del changed
+    if path.suffix.lower() == ".npz":
+        if (options.unit, options.up, options.fps, options.asf) != (None, None, None, None):
+            raise MotionFileError(
+                f"{path}: an .npz file states its unit, axes and frame rate; do not tell them"
+            )
+        motion = read_npz(path, character)
+    else:
+        skeleton = read_motion_file(
+            path, asf_path=options.asf, unit=options.unit, up=options.up, fps=options.fps
+        )
+        try:
+            motion = retarget(skeleton, character, RetargetConfig(flat_floor=options.flat_floor))
+        except MotionError as error:
+            raise MotionFileError(f"{path}: {error}") from error
+    return trim_t_poses(character, motion) if options.trim_t_poses else motion

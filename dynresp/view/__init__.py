@@ -1,0 +1,1 @@
+"""Looking at results: 3D recordings, filmstrips, video and plots of what was decided."""

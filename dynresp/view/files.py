@@ -1,0 +1,43 @@
+"""Writing a file so that it is either whole or not there."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from dynresp.errors import DynrespError
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """A temporary path in the same folder that becomes the file when the block ends well.
+
+    The temporary name ends like the real one, since some writers choose their format by it.
+    If the block raises, what was there before stays.
+
+    Args:
+        path: The file to write; missing folders are made.
+
+    Yields:
+        Where to write.
+
+    Raises:
+        DynrespError: The folder cannot be made or the file cannot be written.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as error:
+        raise DynrespError(
+            f"cannot write {target}: {error.strerror or error}; choose another folder or free space"
+        ) from error
+    finally:
+        # Where not even the folder could be made, there is nothing to take away.
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)

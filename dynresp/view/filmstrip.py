@@ -1,0 +1,353 @@
+"""The filmstrip: one picture of a whole story, drawn without any graphics hardware.
+
+Above, the character at chosen moments, side by side and labelled; below, smaller, the same figures
+where they were, with the ways of the balls and a ruler. Where the character travels far enough for
+the figures to stand clear of each other, one picture serves for both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynresp.motion.rotations import FloatArray
+from dynresp.view import raster, shapes
+from dynresp.view.cast import Cast
+from dynresp.view.files import replacing
+from dynresp.view.moments import Moment, camera_yaw, choose_moments, main_direction
+from dynresp.view.shapes import PHASE_COLORS
+from dynresp.view.story import PHASE_NAMES, Story
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+_INK = (0.14, 0.15, 0.18)
+_FAINT_INK = (0.48, 0.51, 0.55)
+_FLOOR = (0.80, 0.83, 0.86)
+_DPI = 200
+# Half the height of the strip of floor in the picture [m].
+_FLOOR_DEPTH = 0.26
+# Heights of what is not figures, and the margin at the sides [inch].
+_HEADING, _LABELS, _RULER = 0.62, 0.55, 0.30
+_MARGIN = 0.15
+
+
+@dataclass(frozen=True)
+class FilmstripConfig:
+    """How the filmstrip is drawn.
+
+    Attributes:
+        moments: How many figures; more where there are more events.
+        width_px: Width of the picture.
+        turn_deg: How far the camera stands ahead of the character's side.
+        elevation_deg: How far it looks down.
+        overlap: Share of a figure's width that its neighbour may cover.
+        shift: If no figure had to be moved further than this [m] to stand clear, none is.
+        near: Things within this distance of the pelvis are drawn with a figure [m].
+        faintest: How opaque the earliest figure is where figures overlie.
+        lower_scale: Scale of the lower picture in that of the upper one.
+        narrowest: The upper picture shows at least this width [m].
+    """
+
+    moments: int = 8
+    width_px: int = 1920
+    turn_deg: float = 24.0
+    elevation_deg: float = 11.0
+    overlap: float = 0.10
+    shift: float = 0.25
+    near: float = 0.6
+    faintest: float = 0.5
+    lower_scale: float = 0.6
+    narrowest: float = 5.6
+
+
+def write_filmstrip(story: Story, path: Path | str, config: FilmstripConfig | None = None) -> None:
+    """Write the filmstrip of a story as a PNG; the file is whole or not there.
+
+    Args:
+        story: What is shown.
+        path: The file; missing folders are made.
+        config: How it is drawn.
+
+    Raises:
+        DynrespError: The file cannot be written.
+    """
+    figure = _Strip(story, config or FilmstripConfig()).figure()
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+class _Strip:
+    """One filmstrip in the making. Lengths are metres in the picture's frame."""
+
+    def __init__(self, story: Story, config: FilmstripConfig) -> None:
+        self.story = story
+        self.config = config
+        self.cast = Cast(story)
+        self.moments = choose_moments(story, config.moments)
+        self.yaw = camera_yaw(story, float(np.radians(config.turn_deg)))
+        self.elevation = float(np.radians(config.elevation_deg))
+        self.view = raster.Projection.looking(self.yaw, self.elevation)
+        prints = np.stack([self.cast.foot_print(moment.frame) for moment in self.moments])
+        self.prints = self.view.screen(prints)[:, :2]
+        """(moments, 2) the floor below each figure."""
+
+    def figure(self) -> Figure:
+        """Lay out and draw."""
+        from matplotlib.figure import Figure
+
+        extents = np.array([self._extent(moment) for moment in self.moments])
+        # Where each figure is a pair, a gap shows who belongs to whom.
+        overlap = -self.config.overlap if self.story.others else self.config.overlap
+        shifts = spread(extents[:, :2], overlap)
+        apart = bool(shifts[-1] > self.config.shift)
+        offsets = np.zeros((len(self.moments), 2))
+        if apart:
+            offsets = np.stack([shifts, -self.prints[:, 1]], axis=1)
+        moved = extents + np.repeat(offsets, 2, axis=1)
+        left, right = float(moved[:, 0].min()) - 0.12, float(moved[:, 1].max()) + 0.12
+        spare = max(self.config.narrowest - (right - left), 0.0) / 2
+        upper = _Panel(
+            left - spare,
+            float(moved[:, 3].max()) + 0.06,
+            min(float(moved[:, 2].min()) - 0.08, -_FLOOR_DEPTH),
+            (right - left + 2 * spare) / self.config.width_px,
+            self.config.width_px,
+        )
+        panels = [upper]
+        if apart:
+            pixel = upper.pixel / self.config.lower_scale
+            half = 0.5 * self.config.width_px * pixel
+            middle = 0.5 * float(extents[:, 0].min() + extents[:, 1].max())
+            low, high = float(extents[:, 2].min()), float(extents[:, 3].max()) + 0.06
+            low = min(low, self._lowest_ball(middle - half, middle + half)) - 0.1
+            panels.append(_Panel(middle - half, high, low, pixel, self.config.width_px))
+        parts = [_HEADING, upper.height / _DPI, _LABELS]
+        parts[2:2] = [] if apart else [_RULER]
+        parts += [panels[1].height / _DPI, _RULER] if apart else []
+        height = sum(parts)
+        figure = Figure((self.config.width_px / _DPI, height), dpi=_DPI, facecolor="white")
+        ends = 1.0 - np.cumsum(parts) / height
+        for panel, top in zip(panels, (ends[0], ends[2]), strict=False):
+            panel.open(figure, top)
+        if apart:
+            self._figures(upper, offsets, self.config.near)
+        self._true_places(panels[-1])
+        self._labels(figure, upper, offsets, ends[1 if apart else 2], height)
+        self._heading(figure, height)
+        if apart:
+            figure.text(_MARGIN / figure.get_figwidth(), ends[2] - 0.1 / height,
+                        "as they were; above, moved apart sideways", va="top", fontsize=7.5,
+                        color=_FAINT_INK)  # fmt: skip
+        return figure
+
+    def _extent(self, moment: Moment) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top of what is drawn at a moment."""
+        meshes = self.cast.meshes(moment.frame, None, 0.0, self.config.near)
+        points = self.view.screen(np.concatenate([mesh.vertices for mesh in meshes]))
+        (left, bottom, _), (right, top, _) = points.min(axis=0), points.max(axis=0)
+        return float(left), float(right), float(bottom), float(top)
+
+    def _figures(
+        self, panel: _Panel, offsets: FloatArray, within: float, faintest: float = 1.0
+    ) -> None:
+        """The figures in the order of time, the later over the earlier, all shadows below."""
+        fade = np.linspace(faintest, 1.0, len(self.moments))
+        shadows, figures = panel.canvas(), panel.canvas()
+        self._floor(panel, shadows, float((self.prints + offsets)[:, 1].mean()))
+        for moment, offset, alpha in zip(self.moments, offsets, fade, strict=True):
+            meshes = self.cast.meshes(moment.frame, moment.phase, 0.9, within)
+            right, up = (round(float(x) / panel.pixel) for x in offset)
+            shadow = raster.floor_shadow(meshes, self.yaw, self.elevation, panel.pixel)
+            shadows.lay(shadow, right, up, 0.5 * float(alpha))
+            figures.lay(raster.draw(meshes, self.view, panel.pixel), right, up, float(alpha))
+        panel.show(shadows, 1.0)
+        panel.show(figures, 4.0)
+        for ball in self.story.spheres:
+            present = np.flatnonzero(~np.isnan(ball.positions[: len(self.story.motion), 0]))
+            hit, shift = self._hit(ball.positions), np.zeros(2)
+            if hit is None:
+                continue
+            if np.isfinite(within):
+                # In the shifted frame of the figure that it hits.
+                shift = offsets[hit]
+                frame = self.moments[hit].frame
+                reach = [self.cast.distance(at, frame) for at in ball.positions[present]]
+                present = present[np.array(reach) <= 1.5 * within]
+            way = self.view.screen(ball.positions[present])[:, :2] + shift
+            panel.axes.plot(*way.T, color=shapes.BALL_COLOR, lw=1.2, alpha=0.7, zorder=3.0)
+
+    def _lowest_ball(self, left: float, right: float) -> float:
+        """How low in the picture a ball is drawn between two edges, at most a metre down."""
+        lowest = 0.0
+        for ball in self.story.spheres:
+            frames = [m.frame for m in self.moments if m.frame < len(ball.positions)]
+            x, y, _ = self.view.screen(ball.positions[frames]).T
+            seen = y[(x > left) & (x < right)]
+            lowest = min(lowest, *(seen - ball.radius)) if len(seen) else lowest
+        return max(lowest, -1.0)
+
+    def _hit(self, positions: FloatArray) -> int | None:
+        """The moment at which a ball is nearest to the character, None if it is at none."""
+        nearest, best = np.inf, None
+        for number, moment in enumerate(self.moments):
+            if moment.frame < len(positions) and np.isfinite(positions[moment.frame, 0]):
+                away = self.cast.states.centers[moment.frame] - positions[moment.frame]
+                distance = float(np.linalg.norm(away, axis=1).min())
+                # The first of several that are about as near: it is the contact.
+                if distance < nearest - 0.15:
+                    nearest, best = distance, number
+        return best
+
+    def _true_places(self, panel: _Panel) -> None:
+        """The figures where they were, and metres from where the character began."""
+        nowhere = np.zeros((len(self.moments), 2))
+        self._figures(panel, nowhere, np.inf, self.config.faintest)
+        step = float(self.view.screen([*main_direction(self.story), 0.0])[0])
+        origin = float(self.view.screen(self.cast.foot_print(0))[0])
+        axes, bottom, inch = panel.axes, panel.bottom, panel.pixel * _DPI
+        axes.plot([panel.left, panel.right], [bottom, bottom], color=_FAINT_INK, lw=0.8,
+                  clip_on=False)  # fmt: skip
+        for metre in np.arange(
+            np.ceil((panel.left - origin) / step + 0.2), (panel.right - origin) / step - 0.2
+        ):
+            x = origin + metre * step
+            axes.plot([x, x], [bottom, bottom - 0.05 * inch], color=_FAINT_INK, lw=0.8,
+                      clip_on=False)  # fmt: skip
+            axes.text(x, bottom - 0.08 * inch, f"{metre:.0f} m", ha="center", va="top",
+                      fontsize=6.5, color=_FAINT_INK)  # fmt: skip
+
+    def _labels(
+        self, figure: Figure, panel: _Panel, offsets: FloatArray, top: float, height: float
+    ) -> None:
+        """Time and events under the feet, pushed apart where they would meet."""
+        inches = figure.get_figwidth()
+        anchors = (self.prints[:, 0] + offsets[:, 0] - panel.left) / (panel.right - panel.left)
+        words = [" · ".join(moment.events) for moment in self.moments]
+        widths = np.array([max(0.50, 0.064 * len(word) + 0.08) for word in words]) / inches
+        centers = settle(anchors, widths)
+        y = top - 0.12 / height
+        for moment, word, anchor, center in zip(self.moments, words, anchors, centers, strict=True):
+            if abs(anchor - center) > 0.1 / inches:
+                figure.add_artist(_line(figure, (anchor, top), (center, y + 0.01 / height)))
+            figure.text(center, y, f"{moment.time_s:.2f} s", ha="center", va="top", fontsize=8.5,
+                        color=_INK, fontweight="bold")  # fmt: skip
+            color = _INK if moment.phase is None else PHASE_COLORS[moment.phase]
+            figure.text(center, y - 0.17 / height, word, ha="center", va="top", fontsize=8,
+                        color=shapes.mix(color, (0.0, 0.0, 0.0), 0.2))  # fmt: skip
+
+    def _heading(self, figure: Figure, height: float) -> None:
+        """Title and subtitle to the left, the colours of the phases to the right of the latter."""
+        from matplotlib.lines import Line2D
+
+        side = _MARGIN / figure.get_figwidth()
+        title = self.story.title
+        figure.text(side, 1 - 0.12 / height, title, va="top", fontweight="bold", color=_INK,
+                    fontsize=min(12.0, 12.0 * 88 / max(len(title), 1)))  # fmt: skip
+        figure.text(side, 1 - 0.36 / height, self.story.subtitle, va="top", fontsize=8.5,
+                    color=_FAINT_INK)  # fmt: skip
+        shown = {moment.phase for moment in self.moments}
+        handles = [
+            Line2D([], [], ls="", marker="o", ms=5.5, color=PHASE_COLORS[name], label=name)
+            for name in PHASE_NAMES
+            if name in shown
+        ]
+        if handles:
+            figure.legend(handles=handles, ncols=len(handles), frameon=False, fontsize=8.5,
+                          loc="upper right", bbox_to_anchor=(1 - 0.4 * side, 1 - 0.29 / height),
+                          borderaxespad=0.0, handletextpad=0.1, columnspacing=1.1,
+                          labelcolor=_INK)  # fmt: skip
+
+    def _floor(self, panel: _Panel, canvas: raster.Canvas, y: float) -> None:
+        """A strip of floor that fades towards the eye and towards the distance."""
+        rise = (panel.top - (np.arange(panel.height) + 0.5) * panel.pixel - y) / _FLOOR_DEPTH
+        canvas.rgba[..., 3] = 0.6 * np.clip(1.0 - rise**2, 0.0, 1.0)[:, None]
+        canvas.rgba[..., :3] = canvas.rgba[..., 3:] * np.array(_FLOOR)
+
+
+class _Panel:
+    """A part of the picture over its whole width, in metres, on whole pixels."""
+
+    def __init__(self, left: float, top: float, bottom: float, pixel: float, width: int) -> None:
+        self.pixel, self.width = pixel, width
+        self._first, self._top = round(left / pixel), round(top / pixel)
+        self.height = self._top - round(bottom / pixel)
+        self.left, self.right = self._first * pixel, (self._first + width) * pixel
+        self.top, self.bottom = self._top * pixel, (self._top - self.height) * pixel
+
+    def open(self, figure: Figure, top: float) -> None:
+        """Make its axes, from a share of the figure's height downwards."""
+        share = self.height / _DPI / figure.get_figheight()
+        self.axes: Axes = figure.add_axes((0.0, top - share, 1.0, share))
+        self.axes.set_axis_off()
+        self.axes.set_autoscale_on(False)
+        self.axes.set_xlim(self.left, self.right)
+        self.axes.set_ylim(self.bottom, self.top)
+
+    def canvas(self) -> raster.Canvas:
+        """An empty canvas that covers it."""
+        return raster.Canvas(self._first, self._top, self.width, self.height)
+
+    def show(self, canvas: raster.Canvas, above: float) -> None:
+        """Put a canvas of its own into the figure."""
+        self.axes.imshow(
+            canvas.picture(),
+            extent=(self.left, self.right, self.bottom, self.top),
+            aspect="auto",
+            interpolation="nearest",
+            zorder=above,
+        )
+
+
+def spread(extents: FloatArray, overlap: float) -> FloatArray:
+    """How far to move figures to the right so that each stands clear of the one before.
+
+    Args:
+        extents: (n, 2) left and right edges, in the order of time.
+        overlap: Share of the narrower figure of two that may be covered.
+
+    Returns:
+        (n,) shifts, from 0, none smaller than the one before.
+    """
+    widths = extents[:, 1] - extents[:, 0]
+    shifts = np.zeros(len(extents))
+    for k in range(1, len(extents)):
+        covered = overlap * min(widths[k - 1], widths[k])
+        clear = extents[k - 1, 1] + shifts[k - 1] - covered - extents[k, 0]
+        shifts[k] = max(shifts[k - 1], clear)
+    return shifts
+
+
+def settle(anchors: FloatArray, widths: FloatArray) -> FloatArray:
+    """Centres of labels that do not overlap, as near to their anchors as can be (least squares).
+
+    Args:
+        anchors: (n,) where each label would be.
+        widths: (n,) of the labels, in the same unit; together at most 1.
+
+    Returns:
+        (n,) centres, within 0 to 1.
+    """
+    from scipy.optimize import isotonic_regression
+
+    order = np.argsort(anchors, kind="stable")
+    ordered = widths[order]
+    # Less the room of the labels before it, a label need only not be left of its neighbour.
+    room = np.cumsum(ordered) - 0.5 * ordered
+    free = isotonic_regression(anchors[order] - room).x
+    centers = np.empty_like(anchors)
+    centers[order] = np.clip(free, 0.0, max(1.0 - float(widths.sum()), 0.0)) + room
+    return centers
+
+
+def _line(figure: Figure, a: tuple[float, float], b: tuple[float, float]) -> Line2D:
+    from matplotlib.lines import Line2D
+
+    return Line2D(
+        (a[0], b[0]), (a[1], b[1]), transform=figure.transFigure, color=_FAINT_INK, lw=0.6
+    )

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from dynresp.errors import MotionError
+from dynresp.view.plots import RankedReaction, write_alignment, write_ranking
+
+EXITS, ENTRIES = np.arange(6) / 30, np.arange(20) / 30
+RANKING = [RankedReaction("step", 1.0), RankedReaction("roll", 3.0), RankedReaction("no", np.inf)]
+
+
+def bowl() -> np.ndarray:
+    return (EXITS[:, None] - 0.1) ** 2 + (ENTRIES - 0.3) ** 2
+
+
+def test_map_surface_and_ranking(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    errors = bowl()
+    errors[0, :3], errors[-1, -1] = np.nan, np.inf
+    write_alignment(
+        tmp_path / "a.png", errors, EXITS, ENTRIES, 0.1, 0.3, "a title", unit="m²",
+        ranking=RANKING, chosen_name="step",
+    )  # fmt: skip
+    picture = matplotlib.image.imread(tmp_path / "a.png")
+    assert picture.shape[:2] == (660, 1980)
+    red = (picture[..., 0] > 0.8) & (picture[..., 1] < 0.3) & (picture[..., 2] < 0.3)
+    assert red.sum() > 100
+    assert capfd.readouterr().out == ""
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("shape", [(1, 20), (6, 1), (1, 1), (6, 20)])
+def test_flat_and_thin_surfaces(tmp_path: Path, shape: tuple[int, int]) -> None:
+    exits, entries = EXITS[: shape[0]], ENTRIES[: shape[1]]
+    write_alignment(tmp_path / "a.png", np.ones(shape), exits, entries, exits[0], entries[-1])
+    assert (tmp_path / "a.png").stat().st_size > 5000
+
+
+def test_surfaces_that_cannot_be_shown(tmp_path: Path) -> None:
+    file = tmp_path / "a.png"
+    with pytest.raises(MotionError, match=r"\(6, 20\), exits by entries"):
+        write_alignment(file, bowl().T, EXITS, ENTRIES, 0.1, 0.3)
+    with pytest.raises(MotionError, match="no finite"):
+        write_alignment(file, np.full((6, 20), np.nan), EXITS, ENTRIES, 0.1, 0.3)
+    with pytest.raises(MotionError, match="rise"):
+        write_alignment(file, bowl(), EXITS[::-1], ENTRIES, 0.1, 0.3)
+    assert not list(tmp_path.iterdir())
+
+
+def test_ranking(tmp_path: Path) -> None:
+    write_ranking(tmp_path / "a.png", RANKING, "roll", "a title")
+    many = [RankedReaction(f"reaction {k}", k + 1.0) for k in range(60)]
+    write_ranking(tmp_path / "b.png", many, "reaction 50")
+    with pytest.raises(MotionError, match="no reaction"):
+        write_ranking(tmp_path / "c.png", [RankedReaction("no", np.inf)], "no")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
