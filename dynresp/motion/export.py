@@ -13,11 +13,8 @@ and readers which do not agree. Rotation channels are in the order Z X Y: R = Rz
 
 from __future__ import annotations
 
-import os
-import secrets
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +22,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import DynrespError, MotionError
+from dynresp.errors import MotionError
+from dynresp.files import replacing
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
@@ -70,7 +68,7 @@ def write_npz(motion: Motion, path: str | Path, character: Character) -> None:
         problem = npz.member_problem(name, array.dtype.str, array.shape)
         if problem:
             raise MotionError(f"motion {motion.name[:80]!r} does not fit a .npz file: {problem}")
-    with _replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, array in arrays.items():
             # Stored, since packed bytes depend on the zlib at hand, and poses hardly shrink.
             info = zipfile.ZipInfo(f"{name}.npy", date_time=_ZIP_TIME)
@@ -101,7 +99,7 @@ def write_bvh(motion: Motion, path: str | Path, character: Character) -> None:
     # Adding zero turns -0.0 into 0.0.
     rows = (np.round(values, _DIGITS) + 0.0).tolist()
     row = " ".join([f"%.{_DIGITS}f"] * values.shape[1]) + "\n"
-    with _replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write("HIERARCHY\n")
         file.writelines(f"{line}\n" for line in _joint_lines(character, 0, 0))
         file.write(f"MOTION\nFrames: {len(motion)}\nFrame Time: {1.0 / motion.fps:.12f}\n")
@@ -200,26 +198,3 @@ def _texts(text: str | list[str]) -> npt.NDArray[np.str_]:
     if array.tolist() != text:
         raise MotionError(f"names must not end in a null character: {text!r}")
     return array.astype(array.dtype.newbyteorder("<"))
-
-
-@contextmanager
-def _replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside `path` that takes its name when the block ends well.
-
-    Raises:
-        DynrespError: The file cannot be written.
-    """
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.part")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            yield temporary
-            os.replace(temporary, target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise DynrespError(
-            f"cannot write {target}: {error.strerror or error}; name another folder or free space"
-        ) from error

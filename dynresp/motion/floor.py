@@ -107,9 +107,7 @@ def _feet(character: Character) -> list[int]:
     return [character.body(f"{side}_foot") for side in FEET]
 
 
-def _lift(
-    character: Character, low: FloatArray, fps: float, config: FloorConfig
-) -> FloatArray:
+def _lift(character: Character, low: FloatArray, fps: float, config: FloorConfig) -> FloatArray:
     """How far to raise the root in each frame (frames,) [m]."""
     others = np.setdiff1d(np.arange(low.shape[1]), _feet(character))
     return _smooth_cover(np.maximum(0.0, -config.sink - low[:, others].min(axis=1)), fps, config)

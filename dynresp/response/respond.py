@@ -54,6 +54,9 @@ class ResponseConfig:
             entered [s].
         carry_on_s: How long the base motion is shown to go on after a miss or a hit that is
             carried on through [s].
+        entry_max_s: Latest time in a reaction at which it is entered [s]. A reaction begins close
+            to its hit; entered much later, the recovery would be shown without what it recovers
+            from.
         remaining_s: What is left of a reaction where it is entered, at least [s]: the blend, and
             then enough to be seen.
     """
@@ -68,6 +71,7 @@ class ResponseConfig:
     carry_on_exit_s: float = 0.25
     carry_on_slack_s: float = 0.1
     carry_on_s: float = 2.5
+    entry_max_s: float = 0.5
     remaining_s: float = 0.6
 
     @property
@@ -164,8 +168,9 @@ class Responder:
         if self.config.window.fps != fps or any(r.motion.fps != fps for r in library.reactions):
             raise MotionError(f"simulation, search and library must all run at {fps:g} fps")
         left = round(max(self.config.remaining_s, self.config.transition.blend_s + 2 / fps) * fps)
+        latest = round(self.config.entry_max_s * fps) + 1
         tracks = [
-            self._track(r.name, r.motion.poses, (0, max(1, len(r.motion) - left)))
+            self._track(r.name, r.motion.poses, (0, max(1, min(latest, len(r.motion) - left))))
             for r in library.reactions
         ]
         self.windows: LibraryWindows = library_windows(tracks, self.config.window)

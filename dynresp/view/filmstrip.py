@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dynresp.files import replacing
 from dynresp.motion.rotations import FloatArray
 from dynresp.view import raster, shapes
 from dynresp.view.cast import Cast
-from dynresp.view.files import replacing
 from dynresp.view.moments import Moment, camera_yaw, choose_moments, main_direction
 from dynresp.view.shapes import PHASE_COLORS
 from dynresp.view.story import PHASE_NAMES, Story

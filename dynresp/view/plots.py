@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import MotionError
+from dynresp.files import replacing
 from dynresp.motion.rotations import FloatArray
-from dynresp.view.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynresp.errors import DynrespError
+from dynresp.files import replacing
 from dynresp.view import shapes
 from dynresp.view.cast import Cast
-from dynresp.view.files import replacing
 from dynresp.view.moments import camera_yaw
 from dynresp.view.shapes import PHASE_COLORS, Color, Mesh
 from dynresp.view.story import PHASE_NAMES, MovingCapsule, MovingSphere, PhaseName, Story, row_at

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from dynresp.errors import DynrespError, UsageError
+from dynresp.files import replacing
 from dynresp.motion.rotations import FloatArray
 from dynresp.view import shapes
 from dynresp.view.cast import Cast
-from dynresp.view.files import replacing
 from dynresp.view.moments import camera_yaw
 from dynresp.view.shapes import Color, Mesh
 from dynresp.view.story import Story

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dynresp.errors import DynrespError
-from dynresp.view.files import replacing
+from dynresp.files import replacing
 
 
 def test_whole_file_in_a_new_folder(tmp_path: Path) -> None:
