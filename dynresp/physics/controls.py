@@ -38,11 +38,10 @@ class Controls:
     """
 
     def __init__(self, scene: Scene) -> None:
-        """Find out where everything lies in a row."""
+        """Find out where everything lies in a row, and when each target is read."""
         self.spec = int(sum(int(part) for part in _PARTS))
         self._fps = scene.config.fps
         self._substeps = scene.config.substeps
-        self._lead = servo_gains(scene.character, scene.config.servo).lead_s * self._fps
         columns, start = [], 0
         for part in _PARTS:
             size = mujoco.mj_stateSize(scene.model, int(part))
@@ -51,6 +50,13 @@ class Controls:
         self._size = start
         self._servos, self._wrenches, self._welds, self._places, self._turns = columns
         self.hold = self._welds.start + scene.hold_weld
+        self._steps = np.arange(self._substeps) / self._substeps
+        # Every simulation is at a whole frame, so these are the same for all.
+        lead = servo_gains(scene.character, scene.config.servo).lead_s * self._fps
+        self._joints_at = self._steps[:, None] + lead
+        self._hold_at = self._steps + HOLD_LEAD_S * self._fps
+        latest = max(self._joints_at.max(), self._hold_at.max())
+        self._ahead = np.arange(int(np.floor(latest)) + 2)
 
     def pack(
         self,
@@ -75,22 +81,25 @@ class Controls:
         controls = np.zeros((len(impacts), self._substeps, self._size))
         controls[..., self._welds] = 1.0
         controls[..., self.hold] = np.asarray(held, dtype=np.float64)[:, None]
-        steps = np.arange(self._substeps) / self._substeps
-        for i, (target, at) in enumerate(zip(targets, target_frames, strict=True)):
-            self._track(controls[i], target, at + steps)
-        for row, impact, frame in zip(controls, impacts, frames, strict=True):
-            self._hit(row, impact, frame + steps)
-        return controls
-
-    def _track(self, row: FloatArray, target: FloatArray, at: FloatArray) -> None:
-        """Servo targets and where the pelvis is held, at fractional frames of the target."""
-        joints = target[:, JOINTS].reshape(len(target), -1, 4)
+        near = np.stack(
+            [
+                target[np.minimum(at + self._ahead, len(target) - 1)]
+                for target, at in zip(targets, target_frames, strict=True)
+            ]
+        )
         # The servo normalises its target, so a straight line between two poses will do.
-        row[:, self._servos] = between(joints, at[:, None] + self._lead).reshape(len(at), -1)
-        held = at + HOLD_LEAD_S * self._fps
-        row[:, self._places.start : self._places.start + 3] = between(target[:, ROOT], held)
-        turn = rotations.normalize(between(target[:, ROOT_QUAT], held))
-        row[:, self._turns.start : self._turns.start + 4] = turn
+        joints = near[..., JOINTS].reshape(*near.shape[:2], -1, 4)
+        controls[..., self._servos] = between(joints, self._joints_at).reshape(
+            len(near), self._substeps, -1
+        )
+        place, turn = self._places.start, self._turns.start
+        controls[..., place : place + 3] = between(near[..., ROOT], self._hold_at)
+        controls[..., turn : turn + 4] = rotations.normalize(
+            between(near[..., ROOT_QUAT], self._hold_at)
+        )
+        for row, impact, frame in zip(controls, impacts, frames, strict=True):
+            self._hit(row, impact, frame + self._steps)
+        return controls
 
     def _hit(self, row: FloatArray, impact: PreparedImpact, at: FloatArray) -> None:
         """The force of a push, or the path of a striking arm, at fractional frames."""
@@ -100,7 +109,7 @@ class Controls:
             row[:, column : column + 3] = share[:, None] * impact.push_force
         if impact.strike_poses is not None:
             drawn = at + STRIKE_LEAD_S * self._fps
-            pose = between(impact.strike_poses, drawn)
+            pose = between(impact.strike_poses[None], drawn)[0]
             row[:, self._places.start + 3 : self._places.start + 6] = pose[:, :3]
             turn = rotations.normalize(pose[:, 3:])
             row[:, self._turns.start + 4 : self._turns.start + 8] = turn
@@ -110,17 +119,19 @@ def between(rows: FloatArray, at: FloatArray) -> FloatArray:
     """Rows at fractional indices, along straight lines; the last row holds after the end.
 
     Args:
-        rows: (frames, n), or (frames, joints, n) where each joint is read at times of its own.
+        rows: (simulations, frames, n), or (simulations, frames, joints, n) where each joint is
+            read at times of its own.
         at: (steps,), or (steps, joints).
 
     Returns:
-        (steps, n) or (steps, joints, n).
+        (simulations, steps, n), or (simulations, steps, joints, n).
     """
-    at = np.minimum(at, len(rows) - 1.0)
-    low = np.minimum(at.astype(np.intp), max(len(rows) - 2, 0))
-    high = np.minimum(low + 1, len(rows) - 1)
+    last = rows.shape[1] - 1
+    at = np.minimum(at, float(last))
+    low = np.minimum(at.astype(np.intp), max(last - 1, 0))
+    high = np.minimum(low + 1, last)
     weight = (at - low)[..., None]
     if at.ndim == 1:
-        return (1.0 - weight) * rows[low] + weight * rows[high]
+        return (1.0 - weight) * rows[:, low] + weight * rows[:, high]
     joint = np.arange(at.shape[1])
-    return (1.0 - weight) * rows[low, joint] + weight * rows[high, joint]
+    return (1.0 - weight) * rows[:, low, joint] + weight * rows[:, high, joint]

@@ -22,10 +22,13 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig
 
 GRAVITY = 9.81
-# A ball or a fist is let go this long before it is due, so that it is clear of the character when
-# the simulation begins, and waited for this long after, before it counts as a miss [s].
+# A ball or a fist is let go this long before it is due [s] or this far away [m], whichever is
+# earlier, so that it is clear of the character when the simulation begins; and it is waited for
+# this long after, before it counts as a miss [s].
 APPROACH_S = 0.2
+APPROACH_M = 0.7
 WAIT_S = 0.2
+_FLOOR_GAP = 0.005
 # A body of solid stuff: moment of inertia of a sphere, 2/5 m r^2.
 _SPHERE_INERTIA = 0.4
 
@@ -57,24 +60,23 @@ class Ball:
     height: float | None = None
     offset: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check(self)
+
 
 @dataclass(frozen=True)
-class Punch:
+class Punch(Ball):
     """A fist-sized mass that comes straight in, carried by an arm that is not simulated.
 
     Attributes are those of `Ball`; the mass is the effective mass of a punch, of which 2 to 5 kg
     are measured in boxers (Walilko, Viano & Bir 2005, Br. J. Sports Medicine 39, 710-719: 2.9 kg).
     """
 
-    time: float
     speed: float = 9.0
     mass: float = 2.9
     radius: float = 0.05
-    from_deg: float = 0.0
-    elevation_deg: float = 0.0
     target: str = "head"
-    height: float | None = None
-    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,10 @@ class Push:
     from_deg: float = 0.0
     elevation_deg: float = 0.0
     target: str = "chest"
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check(self)
 
 
 @dataclass(frozen=True)
@@ -121,8 +127,42 @@ class Strike:
     from_deg: float = 0.0
     target: str = "head"
 
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check(self)
+        if self.side not in ("left", "right"):
+            raise SpecError(f"side must be left or right, got {self.side!r}")
+
 
 Impact: TypeAlias = Ball | Punch | Push | Strike
+
+BOUNDS = {
+    "time": (0.0, 1e6),
+    "speed": (0.1, 2000.0),
+    "mass": (0.01, 200.0),
+    "radius": (0.01, 1.0),
+    "from_deg": (-720.0, 720.0),
+    "elevation_deg": (-89.0, 89.0),
+    "height": (0.0, 3.0),
+    "offset": (-10.0, 10.0),
+    "force": (0.0, 50_000.0),
+    "duration": (0.005, 5.0),
+    "motion_time": (0.0, 1e6),
+}
+"""Least and greatest value of every number of an impact, in the units given above."""
+
+
+def _check(impact: Impact) -> None:
+    """Refuse numbers that are not finite or out of bounds.
+
+    Raises:
+        SpecError: Names the number, what was given and what is allowed.
+    """
+    for name, (least, most) in BOUNDS.items():
+        value = getattr(impact, name, None)
+        # Written so that what is not a number is refused, too.
+        if value is not None and not least <= value <= most:
+            raise SpecError(f"{name} must be from {least:g} to {most:g}, got {value!r}")
 
 
 @dataclass(frozen=True)
@@ -178,6 +218,8 @@ def prepare(
         SpecError: The impact comes before the base motion has begun or after it has ended.
     """
     lead = 0.0 if isinstance(impact, Push) else APPROACH_S
+    if isinstance(impact, Ball):
+        lead = max(lead, APPROACH_M / impact.speed)
     start = int(np.floor((impact.time - lead) * base.fps + 1e-9))
     if start < 0 or impact.time > base.duration:
         raise SpecError(
@@ -231,7 +273,13 @@ def _prepare_projectile(
     velocity = impact.speed * direction
     weightless = isinstance(impact, Punch)
     pull = np.array([0.0, 0.0, 0.0 if weightless else -GRAVITY])
-    position = target + impact.offset * right - velocity * due_s + 0.5 * pull * due_s**2
+    goal = target + impact.offset * right
+    position = goal - velocity * due_s + 0.5 * pull * due_s**2
+    if position[2] < impact.radius:
+        # A ball that comes level at a low target would have come through the floor: it is let go
+        # just above it, and falls a little at the target.
+        position[2] = impact.radius + _FLOOR_GAP
+        velocity[2] = (goal[2] - position[2]) / due_s + 0.5 * pull[2] * due_s
     return PreparedImpact(
         ImpactorKind.PROJECTILE,
         start,
@@ -260,9 +308,11 @@ def _prepare_strike(
         )
     direction = _direction(impact, base)
     target = _target(base, character, impact.time, impact.target, None)
-    placed = motion.placed(yaw=float(np.arctan2(direction[1], direction[0])))
+    # It faces along the blow when the fist is due.
+    facing = rotations.yaw_of(motion.sample([impact.motion_time])[0, ROOT_QUAT])
+    turn = float(np.arctan2(direction[1], direction[0]) - facing)
+    placed = motion.moved(turn, np.zeros(3))
     forearm = character.body(f"{impact.side}_forearm")
-    # Turn it so that the fist's way to the target, not the chest, points along the direction.
     reach = _fist(character, placed.sample([impact.motion_time]), forearm)
     placed = placed.moved(0.0, np.array([*(target - reach)[:2], 0.0]))
     frames = int(np.ceil((due_s + WAIT_S + 2.0) * config.fps))

@@ -22,7 +22,7 @@ IMPACTOR_PREFIX = "impactor/"
 # The weld that holds the pelvis to the base motion is this stiff: time constant [s], damping ratio.
 _HOLD_SOLREF = (0.01, 1.0)
 # The weld that draws a striking arm along its recorded path gives a little, as a shoulder does.
-_STRIKE_SOLREF = (0.02, 1.0)
+_STRIKE_SOLREF = (0.012, 1.0)
 # A weld damps the speed against its target, which to MuJoCo stands still; reading the target this
 # much ahead cancels the lag. From solref, damping over stiffness is 2 x time constant x ratio^2.
 HOLD_LEAD_S = 2.0 * _HOLD_SOLREF[0] * _HOLD_SOLREF[1] ** 2

@@ -125,7 +125,7 @@ class Simulation:
             [self.setups[i].impact for i in ids], now, [self.setups[i].base for i in ids], now, held
         )
         record = ("sensordata",) if self.scene.model.nsensordata else ()
-        found = self._run(ids, controls, record, frame)
+        found = self._run(ids, controls, record, now)
         first = self._first_contacts(ids, held, found.get("sensordata"), frame)
         if first:
             rows = np.array(sorted(first))
@@ -133,7 +133,7 @@ class Simulation:
                 controls[row, first[row] :, self._controls.hold] = 0.0
             again = ids[rows]
             self._batch.state[again] = [self._states[i][frame] for i in again]
-            self._run(again, controls[rows], (), frame)
+            self._run(again, controls[rows], (), [frame] * len(rows))
         for i in ids:
             self._keep(i)
 
@@ -152,7 +152,11 @@ class Simulation:
         Returns:
             For each, the whole trace from the setup's first frame.
         """
-        rows = np.asarray(ids)
+        # The batch takes its simulations in increasing order.
+        order = np.argsort(np.asarray(ids))
+        rows = np.asarray(ids)[order]
+        frames = [frames[k] for k in order]
+        targets = [targets[k] for k in order]
         for i, frame in zip(rows, frames, strict=True):
             del self._states[i][frame + 1 :]
             self._batch.state[i] = self._states[i][frame]
@@ -170,26 +174,27 @@ class Simulation:
                 [step] * len(alive),
                 np.zeros(len(alive)),
             )
-            self._run(running, controls, (), now[0])
+            self._run(running, controls, (), now)
             for i in running:
                 self._keep(i)
-        return [self._trace(int(i)) for i in rows]
+        return [self._trace(i) for i in ids]
 
     def _run(
         self,
         ids: npt.NDArray[np.intp],
         controls: FloatArray,
         record: tuple[str, ...],
-        frame: int,
+        frames: Sequence[int],
     ) -> dict[str, npt.NDArray[np.float64]]:
-        before = self._batch.warning[ids].copy()
+        # Of each warning the batch holds the last information and the count.
+        before = self._batch.warning[ids, :, 1].copy()
         result = self._batch.rollout(
             self.substeps, controls, self._controls.spec, record=record, ids=ids
         )
-        rose = self._batch.warning[ids] > before
-        for row in np.flatnonzero(rose.any(axis=1)):
+        rose = self._batch.warning[ids, :, 1] > before
+        for row in map(int, np.flatnonzero(rose.any(axis=1))):
             kind = mujoco.mjtWarning(int(np.argmax(rose[row]))).name.removeprefix("mjWARN_")
-            self._diverged[ids[row]] = Divergence(frame, kind)
+            self._diverged[ids[row]] = Divergence(frames[row], kind)
         return result
 
     def _keep(self, i: int) -> None:

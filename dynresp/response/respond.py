@@ -89,7 +89,8 @@ class ResponseConfig:
     @property
     def horizon_s(self) -> float:
         """How long the simulation looks ahead after contact [s]."""
-        return self.window.exit_max_s + self.window.window_s
+        latest = max(self.window.exit_max_s, self.carry_on_exit_s, _GRAZE_S)
+        return latest + self.window.window_s
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,14 @@ class Responder:
 
         Raises:
             SpecError: An impact lies outside its base motion.
+            MotionError: A base motion has another frame rate.
         """
+        for base, _ in hits:
+            if base.fps != self.config.physics.fps:
+                raise MotionError(
+                    f"base motion {base.name!r} has {base.fps:g} fps, but the simulation runs at "
+                    f"{self.config.physics.fps:g}; resample it"
+                )
         tell = progress or (lambda stage, done, of: None)
         prepared = [
             prepare(impact, base, self.character, self.config.physics) for base, impact in hits
@@ -367,9 +375,12 @@ class Responder:
         length = self.config.transition.blend_frames(base.fps)
         out = trace.contact.frame + choice.exit
         simulated = final.poses[out : out + length + 1]
-        entered = choice.motion.poses[choice.entry :]
+        left = len(choice.motion) - choice.entry
         if choice.name == CARRY_ON:
-            entered = entered[: length + 1 + shown]
+            left = min(left, length + 1 + shown)
+        # Where a motion ends before the blend does, its last pose holds.
+        at = choice.entry + np.arange(max(left, length + 2))
+        entered = choice.motion.poses[np.minimum(at, len(choice.motion) - 1)]
         placed = place_on(entered, 0, simulated[0])
         # Halfway between two poses that stand, legs can reach below the floor.
         blend = blend_onto(simulated, placed[: length + 1])

@@ -15,7 +15,7 @@ import numpy as np
 from dynresp.errors import UsageError
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT
-from dynresp.motion.motion import interpolate, move_poses
+from dynresp.motion.motion import move_poses
 from dynresp.motion.rotations import FloatArray
 
 
@@ -80,7 +80,7 @@ def blended_targets(
         (n, 59). The blend begins with the first target and ends at `end`.
     """
     at = np.clip(entry + np.arange(len(base)) - start, 0, len(reaction) - 1)
-    return interpolate(base, reaction[at], rotations.ease(np.arange(len(base)) / end))
+    return _blend(base, reaction[at], rotations.ease(np.arange(len(base)) / end))
 
 
 def blend_onto(simulated: FloatArray, reaction: FloatArray) -> FloatArray:
@@ -94,4 +94,25 @@ def blend_onto(simulated: FloatArray, reaction: FloatArray) -> FloatArray:
         (n + 1, 59): the first pose is the simulated one, the last the reaction's.
     """
     weight = rotations.ease(np.arange(len(simulated)) / max(len(simulated) - 1, 1))
-    return interpolate(simulated, reaction, weight)
+    return _blend(simulated, reaction, weight)
+
+
+def _blend(a: FloatArray, b: FloatArray, weight: FloatArray) -> FloatArray:
+    """Poses from a to b (frames, 59): the root by straight lines, rotations by slerp.
+
+    Each rotation goes one way round, the shorter one at the first frame: where two motions turn
+    apart by more than half a turn, slerp frame by frame would leap to the other way. Quaternions
+    are continuous in sign.
+    """
+    out = np.empty_like(a)
+    out[:, ROOT] = a[:, ROOT] + weight[:, None] * (b[:, ROOT] - a[:, ROOT])
+    qa, qb = (rotations.make_continuous(x[:, 3:].reshape(len(a), -1, 4)) for x in (a, b))
+    turn = rotations.make_continuous(rotations.multiply(rotations.conjugate(qa), qb))
+    turn = np.where(turn[:1, :, :1] < 0, -turn, turn)
+    sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+    half_angle = np.arctan2(sine, turn[..., :1])
+    # Half the angle over its sine, which is 1 at zero.
+    scale = np.where(sine > 1e-9, half_angle / np.where(sine > 1e-9, sine, 1.0), 1.0)
+    part = rotations.from_rotation_vector(2.0 * weight[:, None, None] * scale * turn[..., 1:])
+    out[:, 3:] = rotations.make_continuous(rotations.multiply(qa, part)).reshape(len(a), -1)
+    return out
