@@ -22,9 +22,9 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig
 
 GRAVITY = 9.81
-# A ball or a fist is let go this long before it is due [s] or this far away [m], whichever is
-# earlier, so that it is clear of the character when the simulation begins; and it is waited for
-# this long after, before it counts as a miss [s].
+# A ball or a fist is let go this long before it is due [s] or with its surface this far away [m],
+# whichever is earlier, so that it is clear of the character when the simulation begins; and it is
+# waited for this long after, before it counts as a miss [s].
 APPROACH_S = 0.2
 APPROACH_M = 0.7
 WAIT_S = 0.2
@@ -36,6 +36,9 @@ _SPHERE_INERTIA = 0.4
 @dataclass(frozen=True)
 class Ball:
     """A thrown ball, which flies freely.
+
+    One whose way to a low target would begin in the floor is let go just above it instead: it
+    comes in time and place, but falls a little there (slow and level balls most).
 
     Attributes:
         time: When its centre is due at the target, were nothing in its way [s].
@@ -219,7 +222,7 @@ def prepare(
     """
     lead = 0.0 if isinstance(impact, Push) else APPROACH_S
     if isinstance(impact, Ball):
-        lead = max(lead, APPROACH_M / impact.speed)
+        lead = max(lead, (APPROACH_M + impact.radius) / impact.speed)
     start = int(np.floor((impact.time - lead) * base.fps + 1e-9))
     if start < 0 or impact.time > base.duration:
         raise SpecError(
@@ -324,12 +327,14 @@ def _prepare_strike(
         axis=1,
     )
     speed = (track[1, :3] - track[0, :3]) * config.fps
+    turn = rotations.multiply(rotations.conjugate(track[0, 3:]), track[1, 3:])
+    spin = rotations.to_rotation_vector(turn) * config.fps
     return PreparedImpact(
         ImpactorKind.STRIKER,
         start,
         due_s,
         impactor_pose=track[0],
-        impactor_velocity=np.concatenate([speed, np.zeros(3)]),
+        impactor_velocity=np.concatenate([speed, spin]),
         strike_poses=track,
         opponent=opponent,
     )

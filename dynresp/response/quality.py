@@ -1,6 +1,7 @@
 """How good a response is, in numbers. `docs/quality.md` says what each means.
 
-All are taken from the finished motion alone, at its own frame rate (30 fps).
+All are taken from the finished motion at its own frame rate (30 fps); only the root's jump also
+needs what the simulation and the reaction would have done at the seams.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.respond import Response
 
+# A motion that stands still has hardly any joint speed steps; a seam is then measured against this
+# [rad/s], about the sway of a standing person.
+_LEAST_REFERENCE = 0.1
 # The share of joint speed steps in the motion entered that a seam is measured against.
 _PERCENTILE = 99.9
 
@@ -29,7 +33,8 @@ class Quality:
     Attributes:
         speed_step_exit: Largest joint speed step at the first seam [rad/s].
         speed_step_end: The same at the second seam [rad/s].
-        speed_step_reference: 99.9th percentile of the joint speed steps in the motion entered.
+        speed_step_reference: 99.9th percentile of the joint speed steps in the motion entered,
+            at least 0.1 rad/s.
         speed_step_ratio: The larger of the two over the reference.
         root_jump_m: How far the root departs at a seam, in one frame, from the simulation that it
             leaves or the reaction that it joins [m].
@@ -69,7 +74,8 @@ def measure(response: Response, character: Character) -> Quality | None:
     motion = response.motion
     steps = joint_speed_steps(motion)
     at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
-    reference = float(np.percentile(joint_speed_steps(response.entered), _PERCENTILE))
+    own = float(np.percentile(joint_speed_steps(response.entered), _PERCENTILE))
+    reference = max(own, _LEAST_REFERENCE)
     assert response.left is not None
     assert response.joined is not None
     jumps = [
@@ -87,7 +93,7 @@ def measure(response: Response, character: Character) -> Quality | None:
         speed_step_exit=at_seams[0],
         speed_step_end=at_seams[1],
         speed_step_reference=reference,
-        speed_step_ratio=max(at_seams) / reference if reference > 0 else float("inf"),
+        speed_step_ratio=max(at_seams) / reference,
         root_jump_m=max(jump[0] for jump in jumps),
         root_jump_deg=max(jump[1] for jump in jumps),
         root_shake_m=max(shake[0] for shake in shakes),
