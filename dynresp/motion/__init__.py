@@ -1,1 +1,1 @@
-
+"""Motions of one character: rotations, poses, readers, retargeting, the reaction library."""

@@ -1,0 +1,142 @@
+"""The motions that dynresp makes itself, so that all of it works without any motion capture.
+
+Each is a file of `reactions/builtin`: a walk from published gait curves, and key poses with
+timing, which splines and inverse kinematics turn into motion. They stand in until real motion
+capture is there, and are named "built-in" wherever they appear.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from dynresp.errors import UnknownNameError
+from dynresp.motion import ground
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.motion import Label, Motion
+from dynresp.paths import reactions_folder
+
+if TYPE_CHECKING:
+    from dynresp.motion.footing import FootTrack
+    from dynresp.motion.keypose_spec import BuiltinSpec
+    from dynresp.motion.rotations import FloatArray
+
+PREFIX = "built-in: "
+"""How the name of a built-in motion begins."""
+
+
+@dataclass(frozen=True)
+class BuiltinInfo:
+    """What a built-in motion is.
+
+    Attributes:
+        slug: What `load_builtin` takes: its file's name without ".toml".
+        name: For people.
+        kind: "walk", "idle", "guard" or "punch" for base motions, "reaction" for the others.
+        strategy: Of a reaction, such as "side_fall"; None for a base motion.
+        what: What happens in it.
+        source: Where its numbers come from; empty where they were made up by hand.
+    """
+
+    slug: str
+    name: str
+    kind: str
+    strategy: str | None
+    what: str
+    source: str
+
+
+def builtin_folder() -> Path:
+    """Folder of the built-in motions' files."""
+    return reactions_folder() / "builtin"
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Slugs of all built-in motions, sorted."""
+    return tuple(sorted(file.stem for file in builtin_folder().glob("*.toml")))
+
+
+def strategies() -> tuple[str, ...]:
+    """Slugs of the twelve reaction strategies, in the order of Zordan et al. 2007, section 5."""
+    from dynresp.motion.keypose_spec import Strategy
+
+    return get_args(Strategy)
+
+
+def builtin_info(name: str) -> BuiltinInfo:
+    """What a built-in motion is.
+
+    Raises:
+        UnknownNameError: There is no such built-in motion.
+        SpecError: Its file is wrong.
+    """
+    spec = _spec(name)
+    return BuiltinInfo(name, spec.name, spec.kind, spec.strategy, spec.what, spec.source)
+
+
+def load_builtin(name: str, character: Character | None = None) -> Motion:
+    """Make a built-in motion; made once, then kept.
+
+    Args:
+        name: One of `builtin_names`.
+        character: The product's own by default.
+
+    Returns:
+        The motion, facing +X at its start, on the floor z = 0, named "built-in: ...", with foot
+        contacts; a reaction bears its strategy as a label.
+
+    Raises:
+        UnknownNameError: There is no such built-in motion.
+        SpecError: Its file is wrong.
+    """
+    return _made(name, character or default_character())
+
+
+def make_motion(spec: BuiltinSpec, character: Character) -> Motion:
+    """Turn a file's contents into a motion."""
+    poses, _ = make_poses(spec, character)
+    states = character.kinematics(poses)
+    contacts = ground.foot_contacts(character, states, spec.fps)
+    label = Label(spec.strategy or spec.kind, 0, len(poses))
+    return Motion(poses, spec.fps, PREFIX + spec.name, contacts, (label,))
+
+
+def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
+    """Poses (frames, 59) of a file, and where its left and right foot were to be."""
+    from dynresp.motion import footing, gait, keyposes
+
+    if spec.gait is not None:
+        return gait.walk_poses(spec, character)
+    times, channels = keyposes.key_channels(spec, character)
+    poses = keyposes.channel_poses(channels, character)
+    tracks = []
+    for side, outward in (("left", 1.0), ("right", -1.0)):
+        stances = [stance for stance in spec.stance if stance.foot == side]
+        sole = footing.Sole.of(character, side)
+        tracks.append(footing.stance_track(stances, sole, times, outward))
+    # Twice: raising the root changes how the legs bend, and so what is lowest.
+    for _ in range(2):
+        placed = footing.place_feet(character, poses, tracks, spec.fps)
+        poses = footing.rest_on_ground(character, poses, placed, spec.lying, spec.fps)
+    return footing.place_feet(character, poses, tracks, spec.fps), tracks
+
+
+def _file_of(name: str) -> Path:
+    names = builtin_names()
+    if name not in names:
+        raise UnknownNameError("built-in motion", name, names)
+    return builtin_folder() / f"{name}.toml"
+
+
+@functools.cache
+def _spec(name: str) -> BuiltinSpec:
+    from dynresp.motion.keypose_spec import read_spec
+
+    return read_spec(_file_of(name))
+
+
+@functools.lru_cache(maxsize=64)
+def _made(name: str, character: Character) -> Motion:
+    return make_motion(_spec(name), character)

@@ -1,0 +1,382 @@
+"""The files of the built-in motions: what may stand in them, and how a wrong one is refused.
+
+`reactions/builtin/README.md` explains the format to the people who write such files. Angles are in
+degrees under anatomical names, lengths in metres, times in seconds.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from dynresp.errors import SpecError, UnknownNameError
+
+Side = Literal["left", "right"]
+Kind = Literal["walk", "idle", "guard", "punch", "reaction"]
+Strategy = Literal[
+    "step_forward_small",
+    "step_forward_large",
+    "multiple_steps_forward",
+    "forward_roll",
+    "side_fall",
+    "step_backward_small",
+    "step_backward_large",
+    "multiple_steps_backward",
+    "backward_roll",
+    "upper_body_front",
+    "upper_body_side",
+    "upper_body_back",
+]
+
+MAX_DURATION = 120.0
+"""Longest motion that a file may describe [s]."""
+CYCLE_POINTS = 20
+"""Values of a gait curve, one for every 5 % of the cycle."""
+
+CHANNELS: tuple[str, ...] = (
+    *(f"pelvis.{x}" for x in ("x", "y", "height", "pitch", "roll", "yaw")),
+    *(f"{x}.{y}" for x in ("waist", "back", "neck") for y in ("flexion", "lateral", "rotation")),
+    *(
+        f"{side}_{joint}.{x}"
+        for side in ("left", "right")
+        for joint in ("hip", "shoulder")
+        for x in ("flexion", "abduction", "rotation")
+    ),
+    *(f"{side}_{x}" for side in ("left", "right") for x in ("knee", "ankle", "elbow")),
+)
+"""Every value that key poses set and sways move."""
+
+Time = Annotated[float, Field(ge=0.0, le=MAX_DURATION)]
+Place = Annotated[float, Field(ge=-100.0, le=100.0)]
+Turn = Annotated[float, Field(ge=-720.0, le=720.0)]
+KneeAngle = Annotated[float, Field(ge=-5.0, le=158.0)]
+ElbowAngle = Annotated[float, Field(ge=-5.0, le=153.0)]
+AnkleAngle = Annotated[float, Field(ge=-60.0, le=45.0)]
+Curve = Annotated[
+    list[Annotated[float, Field(ge=-180.0, le=180.0)]],
+    Field(min_length=CYCLE_POINTS, max_length=CYCLE_POINTS),
+]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+class Pelvis(_Strict):
+    """Where the pelvis is [m] and how it is turned [deg]; what is left out is not keyed."""
+
+    x: Place | None = None
+    y: Place | None = None
+    height: Annotated[float, Field(ge=-1.0, le=3.0)] | None = None
+    pitch: Turn | None = None
+    roll: Turn | None = None
+    yaw: Turn | None = None
+
+
+class Trunk(_Strict):
+    """Waist, back or neck [deg]: bent forward, to the left, turned to the left."""
+
+    flexion: Annotated[float, Field(ge=-60.0, le=75.0)] | None = None
+    lateral: Annotated[float, Field(ge=-60.0, le=60.0)] | None = None
+    rotation: Annotated[float, Field(ge=-75.0, le=75.0)] | None = None
+
+
+class Limb(_Strict):
+    """Hip or shoulder [deg]: swung forward, away from the body, turned outward."""
+
+    flexion: Annotated[float, Field(ge=-90.0, le=180.0)] | None = None
+    abduction: Annotated[float, Field(ge=-70.0, le=180.0)] | None = None
+    rotation: Annotated[float, Field(ge=-120.0, le=120.0)] | None = None
+
+
+class Key(_Strict):
+    """A key pose: the angles that are set at one time. Plural names set both sides alike."""
+
+    time: Time
+    pelvis: Pelvis | None = None
+    waist: Trunk | None = None
+    back: Trunk | None = None
+    neck: Trunk | None = None
+    hips: Limb | None = None
+    left_hip: Limb | None = None
+    right_hip: Limb | None = None
+    knees: KneeAngle | None = None
+    left_knee: KneeAngle | None = None
+    right_knee: KneeAngle | None = None
+    ankles: AnkleAngle | None = None
+    left_ankle: AnkleAngle | None = None
+    right_ankle: AnkleAngle | None = None
+    shoulders: Limb | None = None
+    left_shoulder: Limb | None = None
+    right_shoulder: Limb | None = None
+    elbows: ElbowAngle | None = None
+    left_elbow: ElbowAngle | None = None
+    right_elbow: ElbowAngle | None = None
+
+    def channels(self) -> dict[str, float]:
+        """The values this key sets, under names such as "left_hip.flexion" or "left_knee"."""
+        given = self.model_dump(exclude_none=True, exclude={"time"})
+        values: dict[str, float] = {}
+        # Plural names first, so that a side's own value stands above what is said of both.
+        for part in sorted(given, key=lambda name: name not in PLURALS):
+            for target in PLURALS.get(part, (part,)):
+                value = given[part]
+                if isinstance(value, Mapping):
+                    values |= {f"{target}.{angle}": number for angle, number in value.items()}
+                else:
+                    values[target] = value
+        return values
+
+
+PLURALS: Mapping[str, tuple[str, str]] = {
+    f"{part}s": (f"left_{part}", f"right_{part}")
+    for part in ("hip", "knee", "ankle", "shoulder", "elbow")
+}
+"""Names that set both sides, and the two that they stand for."""
+
+
+class _Span(_Strict):
+    start: Time = Field(alias="from")
+    stop: Time = Field(alias="to")
+
+    @model_validator(mode="after")
+    def _forward(self) -> _Span:
+        if self.stop <= self.start:
+            raise ValueError(f"'to' ({self.stop:g}) must be later than 'from' ({self.start:g})")
+        return self
+
+
+class Stance(_Span):
+    """A foot that stands in one place.
+
+    Attributes:
+        foot: Which.
+        at: Where its ankle is over the ground while it stands flat: x, y [m].
+        turn: Toes turned outward from the +X direction [deg].
+        heel: The heel is raised by this all the time, the ball stays down [deg].
+        land: The toes are raised by this when the foot touches down; below 0 they come first [deg].
+        push: The heel has risen by this more when the foot leaves [deg].
+        push_time: For how long it rises before [s].
+        by: How the foot gets here from its previous stance: it steps, or the leg moves freely by
+            its joint angles.
+        lift: Height of the step [m].
+    """
+
+    foot: Side
+    at: tuple[Place, Place]
+    turn: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    heel: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
+    land: Annotated[float, Field(ge=-60.0, le=40.0)] = 0.0
+    push: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
+    push_time: Annotated[float, Field(gt=0.0, le=2.0)] = 0.22
+    by: Literal["step", "free"] = "step"
+    lift: Annotated[float, Field(ge=0.0, le=0.6)] = 0.05
+
+    @model_validator(mode="before")
+    @classmethod
+    def _point(cls, data: Any) -> Any:
+        """TOML has lists only; strict mode wants the pair as a tuple."""
+        if isinstance(data, dict) and isinstance(data.get("at"), list):
+            return data | {"at": tuple(data["at"])}
+        return data
+
+
+class Lying(_Span):
+    """A time during which the body rests on the ground: its lowest point touches the floor."""
+
+    ease: Annotated[float, Field(gt=0.0, le=1.0)] = 0.12
+
+
+class Sway(_Strict):
+    """A slow oscillation added to one value: amplitude * sin(2 pi (t / period + phase))."""
+
+    value: str
+    amplitude: Annotated[float, Field(ge=-30.0, le=30.0)]
+    period: Annotated[float, Field(ge=0.2, le=60.0)]
+    phase: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _known(self) -> Sway:
+        if self.value not in CHANNELS:
+            raise ValueError(str(UnknownNameError("value", self.value, CHANNELS)))
+        return self
+
+
+class Gait(_Strict):
+    """Numbers of a steady walk.
+
+    Attributes:
+        cadence: Steps a minute.
+        speed: [m/s].
+        duration: [s].
+        stance: Part of the cycle during which a foot is on the ground [%].
+        foot_flat: When the forefoot is down [% of the cycle].
+        heel_off: When the heel begins to rise [% of the cycle].
+        step_width: Between the ankles, sideways [m].
+        toe_out: [deg].
+        height: Mean height of the pelvis [m].
+    """
+
+    cadence: Annotated[float, Field(ge=40.0, le=200.0)]
+    speed: Annotated[float, Field(ge=0.2, le=3.0)]
+    duration: Annotated[float, Field(ge=1.0, le=MAX_DURATION)]
+    stance: Annotated[float, Field(ge=51.0, le=80.0)]
+    foot_flat: Annotated[float, Field(ge=1.0, le=25.0)]
+    heel_off: Annotated[float, Field(ge=25.0, le=50.0)]
+    step_width: Annotated[float, Field(ge=0.0, le=0.4)]
+    toe_out: Annotated[float, Field(ge=-20.0, le=30.0)]
+    height: Annotated[float, Field(ge=0.5, le=1.2)]
+
+
+class Curves(_Strict):
+    """Curves over the gait cycle, one value every 5 % from the left heel's touch-down.
+
+    Limbs are given for the left side; the right side is half a cycle later. [deg], and [cm] for
+    the three pelvis displacements.
+    """
+
+    hip_flexion: Curve
+    hip_abduction: Curve
+    knee_flexion: Curve
+    ankle_dorsiflexion: Curve
+    shoulder_flexion: Curve
+    elbow_flexion: Curve
+    pelvis_pitch: Curve
+    pelvis_roll: Curve
+    pelvis_yaw: Curve
+    pelvis_forward: Curve
+    pelvis_left: Curve
+    pelvis_up: Curve
+    waist_lateral: Curve
+    waist_rotation: Curve
+    back_rotation: Curve
+    neck_rotation: Curve
+
+
+class BuiltinSpec(_Strict):
+    """A whole file."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    kind: Kind
+    strategy: Strategy | None = None
+    what: Annotated[str, Field(min_length=1)]
+    source: str = ""
+    fps: Annotated[float, Field(ge=10.0, le=240.0)] = 60.0
+    key: list[Key] = []
+    stance: list[Stance] = []
+    lying: list[Lying] = []
+    sway: list[Sway] = []
+    gait: Gait | None = None
+    curves: Curves | None = None
+    rest: Key | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> BuiltinSpec:
+        if (self.kind == "reaction") != (self.strategy is not None):
+            raise ValueError("'strategy' belongs to kind 'reaction', and only to it")
+        if (self.gait is None) != (self.curves is None):
+            raise ValueError("[gait] and [curves] belong together")
+        if self.gait is not None:
+            if self.key or self.stance or self.lying:
+                raise ValueError("a file with [gait] takes no [[key]], [[stance]] or [[lying]]")
+            return self
+        if self.rest is not None:
+            raise ValueError("[rest] belongs to a file with [gait]; use a [[key]] instead")
+        if len(self.key) < 2:
+            raise ValueError(f"at least two [[key]] tables are needed, got {len(self.key)}")
+        if self.key[0].time != 0.0:
+            raise ValueError(f"the first key must be at time 0, got {self.key[0].time:g}")
+        for before, after in zip(self.key, self.key[1:], strict=False):
+            if after.time <= before.time:
+                raise ValueError(
+                    f"keys must follow each other in time: {after.time:g} comes after "
+                    f"{before.time:g}"
+                )
+        self._check_spans(self.key[-1].time)
+        return self
+
+    def _check_spans(self, end: float) -> None:
+        spans = [("lying", x) for x in self.lying] + [(x.foot, x) for x in self.stance]
+        last: dict[str, float] = {}
+        for what, span in spans:
+            if span.stop > end:
+                raise ValueError(
+                    f"{what}: 'to' is {span.stop:g} s, but the last key is at {end:g} s"
+                )
+            if span.start < last.get(what, -1.0):
+                raise ValueError(
+                    f"{what}: the span from {span.start:g} s begins before the one listed "
+                    f"before it has ended ({last[what]:g} s)"
+                )
+            last[what] = span.stop
+
+
+def read_spec(file: Path) -> BuiltinSpec:
+    """Read and check a file of a built-in motion.
+
+    Args:
+        file: A TOML file.
+
+    Returns:
+        Its contents.
+
+    Raises:
+        SpecError: It cannot be read, is not TOML, or holds something that is not allowed; the
+            message names the file, the key, what was given and what is allowed.
+    """
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(f"{file}: cannot be read as text ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"{file}: not valid TOML: {error}") from None
+    try:
+        return BuiltinSpec.model_validate(data)
+    except ValidationError as error:
+        lines = [_explain(dict(item)) for item in error.errors()]
+        raise SpecError(f"{file}: " + "; ".join(lines)) from None
+
+
+_TABLES: Mapping[str, type[BaseModel]] = {
+    "pelvis": Pelvis,
+    "key": Key,
+    "rest": Key,
+    "stance": Stance,
+    "lying": Lying,
+    "sway": Sway,
+    "gait": Gait,
+    "curves": Curves,
+    **dict.fromkeys(("waist", "back", "neck"), Trunk),
+    **dict.fromkeys(
+        ("hips", "left_hip", "right_hip", "shoulders", "left_shoulder", "right_shoulder"), Limb
+    ),
+}
+
+
+def _explain(error: dict[str, Any]) -> str:
+    """One mistake in words: where, what was given, what is allowed."""
+    where = _location(error["loc"])
+    if error["type"] == "extra_forbidden":
+        parents = [part for part in error["loc"][:-1] if isinstance(part, str)]
+        table = _TABLES[parents[-1]] if parents else BuiltinSpec
+        allowed = ", ".join(field.alias or name for name, field in table.model_fields.items())
+        return f"{where} is not known here; allowed: {allowed}"
+    message = error["msg"].removeprefix("Value error, ")
+    if error["type"] == "missing":
+        return f"{where} is missing"
+    if error["type"] == "value_error":
+        return f"{where + ': ' if where else ''}{message}"
+    given = repr(error["input"])
+    return f"{where}: {message}, got {given if len(given) < 80 else given[:77] + '...'}"
+
+
+def _location(parts: tuple[int | str, ...]) -> str:
+    """A place in the file as a person counts: "key 3: left_hip.flexion"."""
+    if len(parts) > 1 and isinstance(parts[1], int):
+        inner = ".".join(str(part) for part in parts[2:])
+        return f"{parts[0]} {parts[1] + 1}" + (f": {inner}" if inner else "")
+    return ".".join(str(part) for part in parts)
