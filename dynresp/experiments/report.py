@@ -1,0 +1,195 @@
+"""Writing what a response is to a folder: motion, recording, pictures, video and `result.json`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from dynresp.errors import DynrespError
+from dynresp.experiments.hits import Hit
+from dynresp.experiments.result import describe, outcome, write_json
+from dynresp.experiments.showing import show
+from dynresp.experiments.spec import Artefact, OutputTable
+from dynresp.motion.character import Character
+from dynresp.response.quality import Quality
+from dynresp.response.respond import CARRY_ON, Response
+
+Progress = Callable[[str, int, int], None]
+"""Told the stage, how many are done, and of how many."""
+
+
+def write_response(
+    folder: Path,
+    title: str,
+    hit: Hit,
+    response: Response,
+    quality: Quality | None,
+    about: dict[str, Any],
+    output: OutputTable,
+    character: Character,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Write one response to a folder.
+
+    What an earlier run left there under these names, and this one does not write, is removed, so
+    that all files in the folder belong together.
+
+    Args:
+        folder: Where to; made if it is missing.
+        title: First line of the pictures.
+        hit: What was asked.
+        response: What came of it.
+        quality: Its figures.
+        about: What `result.json` says about the whole experiment.
+        output: What to write.
+        character: The character.
+        progress: Told the stage, how many are done, and of how many.
+
+    Returns:
+        The content of `result.json`; under `files` it says what was written, and why not where
+        something was asked for and could not be.
+
+    Raises:
+        DynrespError: A file cannot be written.
+    """
+    shown = show(response, hit.impact, output.lead_in_s, title, _subtitle(hit, response))
+    story = shown.story
+    files: dict[str, str] = {}
+
+    def video(path: Path) -> None:
+        from dynresp.view.video import write_video
+
+        write_video(
+            story,
+            path,
+            output.video_size_px,
+            output.video_fps,
+            progress=lambda done, of: progress("drawing the video", done, of),
+        )
+
+    def motion(path: Path) -> None:
+        from dynresp.motion import export
+
+        write = export.write_npz if path.suffix == ".npz" else export.write_bvh
+        write(story.motion, path, character)
+
+    def recording(path: Path) -> None:
+        from dynresp.view.recording import write_recording
+
+        write_recording(story, path)
+
+    def filmstrip(path: Path) -> None:
+        from dynresp.view.filmstrip import write_filmstrip
+
+        write_filmstrip(story, path)
+
+    writers: dict[str, Callable[[Path], None]] = {
+        "motion.npz": motion,
+        "motion.bvh": motion,
+        "recording.html": recording,
+        "filmstrip.png": filmstrip,
+        "alignment.png": lambda path: _write_alignment(path, response, title),
+        "video.mp4": video,
+    }
+    names: Sequence[str] = [name for name in get_args(Artefact) if name in output.write]
+    for done, name in enumerate(names):
+        progress(f"writing {name}", done, len(names))
+        files[name] = _try(writers[name], folder / name)
+    for name in get_args(Artefact):
+        if files.get(name) != WRITTEN:
+            (folder / name).unlink(missing_ok=True)
+    content = {**about, **describe(hit, response, quality, shown), "files": files}
+    write_json(content, folder / "result.json")
+    progress("writing result.json", len(names), len(names))
+    return content
+
+
+WRITTEN = "written"
+"""What `files` in `result.json` says of a file that is there."""
+
+
+class NothingToShowError(DynrespError):
+    """There is nothing that this file could show; the message says why."""
+
+
+def _try(write: Callable[[Path], None], path: Path) -> str:
+    """Write a file, or say why this machine or this response has none."""
+    from dynresp.view.video import RenderingUnavailableError
+
+    try:
+        write(path)
+    except (RenderingUnavailableError, NothingToShowError) as error:
+        return f"not written: {error}"
+    return WRITTEN
+
+
+def _write_alignment(path: Path, response: Response, title: str) -> None:
+    """The error surface of the choice."""
+    from dynresp.view.plots import RankedReaction, write_alignment
+
+    if response.exit is None or response.contact_frame is None or response.choice is None:
+        raise NothingToShowError(f"the outcome is a {outcome(response)}, so nothing was aligned")
+    assert response.oracle is not None
+    assert response.carry_on is not None
+    assert response.entry is not None
+    fps = response.motion.fps
+    carried_on = response.choice == CARRY_ON
+    found = response.carry_on if carried_on else response.oracle
+    surface = found.surface(response.choice)
+    # The base motion was searched around the moment at which it must fit; count from its start.
+    before = response.entry - found.match(response.choice).entry_frame
+    write_alignment(
+        path,
+        surface.errors,
+        surface.exit_frames / fps,
+        (surface.entry_frames + before) / fps,
+        (response.exit - response.contact_frame) / fps,
+        response.entry / fps,
+        title=f"{title}: {spoken(response.choice)}",
+        unit="m",
+        ranking=[RankedReaction(name, error) for name, error in response.errors.items()],
+        chosen_name=response.choice,
+    )
+
+
+def _subtitle(hit: Hit, response: Response) -> str:
+    """The hit and what came of it in a line."""
+    asked = hit.asked
+    if asked["kind"] == "push":
+        what = f"push of {asked['force_n']:.0f} N over {asked['duration_s']:.2g} s"
+    elif asked["kind"] == "strike":
+        what = "recorded strike"
+    else:
+        what = f"{asked['kind']} of {asked['mass_kg']:.2g} kg at {asked['speed_m_s']:.3g} m/s"
+    what += f" from {side_of(asked['from_deg'])}"
+    if response.diverged is not None:
+        return f"{what}: the simulation diverged ({response.diverged.warning})"
+    if response.contact is None or response.choice is None:
+        return f"{what}: missed"
+    body = response.contact.body.replace("_", " ")
+    return f"{what}, hits the {body}: {spoken(response.choice)}"
+
+
+def spoken(choice: str) -> str:
+    """The name of a reaction in words."""
+    return choice.replace("_mirrored", ", mirrored").replace("_", " ")
+
+
+def side_of(from_deg: float) -> str:
+    """Where an impact comes from, in words.
+
+    Args:
+        from_deg: Its bearing about the character's facing; 90 is the left.
+    """
+    names = (
+        "the front",
+        "the front left",
+        "the left",
+        "the back left",
+        "behind",
+        "the back right",
+        "the right",
+        "the front right",
+    )
+    return names[round(from_deg / 45.0) % 8]

@@ -1,0 +1,243 @@
+"""Running an experiment from its file to its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynresp.errors import SpecError, UsageError
+from dynresp.experiments import batch
+from dynresp.experiments.hits import Hit, draw_hits
+from dynresp.experiments.motions import Taken, about_library, take_library, take_motion
+from dynresp.experiments.report import Progress, write_response
+from dynresp.experiments.result import versions, write_json
+from dynresp.experiments.spec import Experiment, SettingsTable, StrikerCut, StrikeTable
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.library import ReactionLibrary
+from dynresp.motion.sources import motion_folders
+from dynresp.physics.impacts import prepare
+from dynresp.response.quality import Quality, measure
+from dynresp.response.respond import Responder, Response, ResponseConfig
+
+# Hits are answered in bundles of this size, so that memory does not grow with their number.
+_BUNDLE = 100
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One hit and what came of it."""
+
+    hit: Hit
+    response: Response
+    quality: Quality | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """An experiment with all that it needs, loaded.
+
+    Attributes:
+        experiment: The file.
+        seed: Seed of its random values.
+        character: The character.
+        base: The base motion.
+        striker: The second character's motion, of a strike.
+        library: The reactions.
+        config: Settings.
+        threads: Threads for the physics, 0 for all cores.
+    """
+
+    experiment: Experiment
+    seed: int
+    character: Character
+    base: Taken
+    striker: Taken | None
+    library: ReactionLibrary
+    config: ResponseConfig
+    threads: int = 0
+    responder: Responder = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Cut the library's windows."""
+        responder = Responder(self.character, self.library, self.config, self.threads)
+        object.__setattr__(self, "responder", responder)
+
+    def hits(self, numbers: range) -> list[Hit]:
+        """Draw hits."""
+        table = self.experiment.impact[0]
+        if self.striker is None:
+            return draw_hits(table, self.seed, numbers)
+        cut = self.striker.cut
+        assert isinstance(cut, StrikerCut)
+        return draw_hits(table, self.seed, numbers, self.striker.motion, cut.hit_s, cut.side)
+
+    def answers(self, numbers: range, progress: Progress) -> Iterator[Answer]:
+        """Answer hits, bundle by bundle."""
+        for start in range(numbers.start, numbers.stop, _BUNDLE):
+            hits = self.hits(range(start, min(start + _BUNDLE, numbers.stop)))
+
+            def tell(stage: str, done: int, of: int, start: int = start) -> None:
+                progress(stage, start - numbers.start + done, len(numbers))
+
+            responses = self.responder.respond(
+                [(self.base.motion, hit.impact) for hit in hits], tell
+            )
+            for hit, response in zip(hits, responses, strict=True):
+                yield Answer(hit, response, measure(response, self.character))
+
+    def about(self) -> dict[str, Any]:
+        """What `result.json` says about the whole experiment."""
+        told: dict[str, Any] = {
+            "experiment": self.experiment.experiment.name,
+            "seed": self.seed,
+            "count": self.experiment.experiment.count,
+            "base": self.base.about,
+        }
+        if self.striker is not None:
+            told["striker"] = self.striker.about
+        return {
+            **told,
+            "library": about_library(self.library, self.experiment.library.which),
+            "settings": self.experiment.settings.model_dump(exclude_none=True),
+            "character": self.character.identity,
+            "versions": versions(),
+        }
+
+
+def prepare_run(
+    experiment: Experiment,
+    beside: Path,
+    motions: Path | None = None,
+    seed: int | None = None,
+    threads: int = 0,
+) -> Run:
+    """Load all that an experiment needs.
+
+    Args:
+        experiment: The file.
+        beside: Its folder, from which relative paths count.
+        motions: Motions folder that the user named.
+        seed: Taken instead of the file's own.
+        threads: Threads for the physics, 0 for all cores.
+
+    Raises:
+        MissingMotionDataError: A motion is not on this machine.
+        DynrespError: A motion or a library cannot be read, or a value does not fit.
+    """
+    character = default_character()
+    folders = motion_folders(motions)
+    config = response_config(experiment.settings)
+    fps = config.physics.fps
+    base = take_motion(
+        experiment.base, experiment.base.otherwise, "base", folders, beside, fps, character
+    )
+    striker = None
+    impact = experiment.impact[0]
+    if isinstance(impact, StrikeTable):
+        table = impact.striker
+        key = "impact.striker"
+        striker = take_motion(table, table.otherwise, key, folders, beside, fps, character)
+        cut = striker.cut
+        assert isinstance(cut, StrikerCut)
+        if cut.hit_s > striker.motion.duration:
+            raise SpecError(
+                f"{key}.hit_s: expected at most {striker.motion.duration:.2f} s, which is how long "
+                f"the striker's motion lasts, got {cut.hit_s:g}"
+            )
+    library = take_library(experiment.library.which, folders, beside, fps, character)
+    chosen = experiment.experiment.seed if seed is None else seed
+    run = Run(experiment, chosen, character, base, striker, library, config, threads)
+    _check_times(run)
+    return run
+
+
+def response_config(settings: SettingsTable) -> ResponseConfig:
+    """Settings of an experiment over the defaults.
+
+    Raises:
+        SpecError: They contradict each other.
+    """
+    given = settings.model_dump(exclude_none=True)
+    config = ResponseConfig()
+
+    def part(of: Any, *keys: str) -> Any:
+        return replace(of, **{key: given[key] for key in keys if key in given})
+
+    try:
+        config = replace(
+            config,
+            physics=part(config.physics, "substeps"),
+            window=part(config.window, "window_s", "exit_min_s", "exit_max_s", "entry_step_s"),
+            transition=part(config.transition, "blend_s", "second_pass"),
+        )
+    except UsageError as error:
+        raise SpecError(f"settings: {error}") from None
+    result: ResponseConfig = part(config, "carry_on_s", "remaining_s")
+    return result
+
+
+def _check_times(run: Run) -> None:
+    """Refuse hits before or after the base motion, before anything is simulated."""
+    hits = run.hits(range(run.experiment.experiment.count))
+    for hit in (min(hits, key=_time), max(hits, key=_time)):
+        try:
+            prepare(hit.impact, run.base.motion, run.character, run.config.physics)
+        except SpecError as error:
+            raise SpecError(f"impact.{str(error).replace('time:', 'time_s:', 1)}") from None
+
+
+def _time(hit: Hit) -> float:
+    return hit.impact.time
+
+
+def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dict[str, Any]:
+    """Answer all hits of an experiment and write what came of them.
+
+    Args:
+        run: The experiment, loaded.
+        out: Folder to write to; made if it is missing.
+        progress: Told the stage, how many are done, and of how many.
+
+    Returns:
+        The content of `result.json`; of a batch, of `summary.json`.
+
+    Raises:
+        DynrespError: A file cannot be written.
+    """
+    tell = progress or (lambda stage, done, of: None)
+    table = run.experiment.experiment
+    about = run.about()
+
+    def write(answer: Answer, folder: Path, title: str) -> dict[str, Any]:
+        return write_response(
+            folder, title, answer.hit, answer.response, answer.quality, about,
+            run.experiment.output, run.character, tell,
+        )  # fmt: skip
+
+    if table.count == 1:
+        (answer,) = run.answers(range(1), tell)
+        return write(answer, out, table.name)
+
+    shown = chosen_hits(run.seed, table.count, table.show)
+    rows, picked = [], []
+    for answer in run.answers(range(table.count), tell):
+        rows.append(batch.row(answer.hit, answer.response, answer.quality))
+        if answer.hit.number in shown:
+            picked.append(answer)
+    for answer in picked:
+        number = answer.hit.number
+        write(answer, out / f"hit_{number:05d}", f"{table.name}, hit {number}")
+    batch.write_table(rows, out / "table.csv")
+    summary = {**about, "shown": shown, **batch.summarise(rows)}
+    write_json(summary, out / "summary.json")
+    return summary
+
+
+def chosen_hits(seed: int, count: int, show: int) -> list[int]:
+    """Which hits of a batch are written in full: chosen by the seed, in order."""
+    rng = np.random.default_rng((seed, count))
+    return sorted(int(n) for n in rng.choice(count, min(show, count), replace=False))

@@ -1,0 +1,66 @@
+"""The shipped examples, on built-in motions and on real motion capture."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dynresp.experiments.reading import read_experiment
+from dynresp.experiments.runner import prepare_run, run_experiment
+from dynresp.experiments.spec import Experiment
+from dynresp.motion.collection import collection_files, files_named_in
+from dynresp.paths import examples_folder
+
+SINGLE = ("walk_ball", "push", "punch", "strike")
+
+
+def example(name: str, **table: int) -> Experiment:
+    """An example that writes little, its `[experiment]` changed."""
+    experiment = read_experiment(examples_folder() / f"{name}.toml")
+    return experiment.model_copy(
+        update={
+            "experiment": experiment.experiment.model_copy(update=table),
+            "output": experiment.output.model_copy(update={"write": ("motion.npz",)}),
+        }
+    )
+
+
+def run(experiment: Experiment, out: Path, motions: Path) -> dict[str, Any]:
+    return run_experiment(prepare_run(experiment, examples_folder(), motions), out)
+
+
+def test_what_they_need_can_be_fetched() -> None:
+    core = {source.file for source in collection_files("core")}
+    for file in examples_folder().glob("*.toml"):
+        assert files_named_in(file) <= core, file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SINGLE)
+def test_they_run_without_motion_capture(name: str, tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    content = run(example(name), tmp_path / "out", empty)
+    assert content["base"]["built_in"]
+    assert content["library"]["built_in"]
+    assert content["happened"]["outcome"] in ("reaction", "carry on")
+
+
+@pytest.mark.slow
+@pytest.mark.mocap
+@pytest.mark.parametrize("name", SINGLE)
+def test_they_show_a_recorded_reaction(name: str, tmp_path: Path, motions_folder: Path) -> None:
+    content = run(example(name), tmp_path / "out", motions_folder)
+    assert not content["base"]["built_in"]
+    assert not content["library"]["built_in"]
+    assert content["happened"]["outcome"] == "reaction"
+    assert content["quality"]["root_jump_m"] < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.mocap
+def test_random_balls_reach_the_targets(tmp_path: Path, motions_folder: Path) -> None:
+    summary = run(example("balls_500", count=120, show=0), tmp_path / "out", motions_folder)
+    assert summary["outcomes"]["diverged"] == 0
+    missed = [target for target in summary["targets"] if not target["met"]]
+    assert not missed
