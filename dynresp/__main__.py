@@ -1,0 +1,5 @@
+"""`python -m dynresp` is `dynresp`."""
+
+from dynresp.cli import main
+
+main()

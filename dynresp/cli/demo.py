@@ -1,0 +1,31 @@
+"""`dynresp demo`: the shipped example."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dynresp.cli.options import Json, Motions, Seed
+from dynresp.cli.run import answer
+
+EXAMPLE = "walk_ball.toml"
+"""The example that is shown, in the folder of examples."""
+
+
+def demo(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")
+    ] = Path("dynresp-demo"),
+    motions: Motions = None,
+    seed: Seed = None,
+    as_json: Json = False,
+) -> None:
+    """Run the shipped example: a heavy ball, a walking person.
+
+    Needs no network: without motion capture on this machine it shows the built-in motions.
+    """
+    from dynresp.paths import examples_folder
+
+    answer(examples_folder() / EXAMPLE, out, motions, seed, as_json)

@@ -1,0 +1,89 @@
+"""`dynresp motions show`: facts about a motion, and pictures of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dynresp.cli import told
+from dynresp.cli.options import Json, Motions
+
+if TYPE_CHECKING:
+    from dynresp.motion.motion import Motion
+
+
+def show(
+    motion: told.Name,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for recording.html and filmstrip.png."),
+    ] = None,
+    unit: told.Unit = None,
+    up: told.Up = None,
+    fps: told.Fps = None,
+    asf: told.Asf = None,
+    trim_t_pose: told.TrimTPose = False,
+    uneven_floor: told.UnevenFloor = False,
+    motions: Motions = None,
+    as_json: Json = False,
+) -> None:
+    """Show what is in a motion, as it is laid onto the character.
+
+    Frames, length, what was found about the file, way, foot contacts, T-poses, and how well it
+    stands on the floor; with --out also a 3D recording and a filmstrip.
+    """
+    from dynresp.cli.facts import facts
+
+    options = told.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
+    loaded, file = told.load(motion, motions, options)
+    found = facts(loaded, file, options)
+    if out is not None:
+        _draw(loaded, out)
+    if as_json:
+        typer.echo(json.dumps({"motion": motion, **found}, indent=2))
+    else:
+        typer.echo("\n".join([motion, *_lines(found)]))
+
+
+def _draw(motion: Motion, out: Path) -> None:
+    from dynresp.view.filmstrip import write_filmstrip
+    from dynresp.view.recording import write_recording
+    from dynresp.view.story import Phase, Story
+
+    # Two thirds of the files come at 120 frames a second, which no screen shows.
+    shown = motion.resampled(30.0) if motion.fps > 30.0 else motion
+    story = Story(
+        shown,
+        phases=[Phase("base motion", 0.0, shown.duration)],
+        title=motion.name,
+        subtitle=f"{motion.duration:.1f} s",
+    )
+    typer.echo("writing recording.html and filmstrip.png ...", err=True)
+    write_recording(story, out / "recording.html")
+    write_filmstrip(story, out / "filmstrip.png")
+
+
+def _lines(found: dict[str, Any]) -> list[str]:
+    ranges = ", ".join(f"{start:.2f} to {stop:.2f} s" for start, stop in found["t_poses_s"])
+    frames = f"{found['frames']} frames at {found['fps']:g} fps"
+    lines = [f"  length     {found['duration_s']:.2f} s, {frames}"]
+    if found["file"] is not None:
+        file = found["file"]
+        lines.append(
+            f"  file       {file['joints']} joints, unit {file['unit_m']:.6g} m, {file['up']} up, "
+            f"legs {file['leg_m']:.2f} m long"
+        )
+    low, high = found["pelvis_height_m"]
+    left, right = found["standing"]
+    return [
+        *lines,
+        f"  way        {found['way_m']:.2f} m over the ground, "
+        f"pelvis {low:.2f} to {high:.2f} m high",
+        f"  contacts   left foot stands {left:.0%} of the time, right {right:.0%}",
+        f"  T-poses    {ranges or 'none'}",
+        f"  floor      lowest point of the feet {100 * found['lowest_foot_m']:.1f} cm, of the rest "
+        f"{100 * found['lowest_body_m']:.1f} cm",
+    ]

@@ -1,0 +1,88 @@
+"""`dynresp run`: from an experiment file to a folder of results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from dynresp.cli.options import Json, Motions, Seed
+from dynresp.cli.progress import progress
+
+
+def run(
+    experiment: Annotated[
+        Path, typer.Argument(metavar="EXPERIMENT.toml", help="The experiment file.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
+    motions: Motions = None,
+    seed: Seed = None,
+    as_json: Json = False,
+) -> None:
+    """Run an experiment: hit the character, and write how it goes on.
+
+    Writes result.json, motion.npz, motion.bvh, recording.html, filmstrip.png, alignment.png and,
+    where the machine can render, video.mp4; of a batch summary.json, table.csv and the same files
+    for some of the hits.
+    """
+    answer(experiment, out, motions, seed, as_json)
+
+
+def answer(
+    experiment: Path, out: Path, motions: Path | None, seed: int | None, as_json: bool
+) -> None:
+    """Run an experiment file and print what came of it.
+
+    Args:
+        experiment: The file.
+        out: Folder for the results.
+        motions: Motions folder that the user named.
+        seed: Taken instead of the file's own.
+        as_json: Print `result.json` or `summary.json` instead of text.
+
+    Raises:
+        typer.Exit: With code 1, where every simulation diverged.
+        DynrespError: It could not be done.
+    """
+    from dynresp.cli.telling import tell_result, tell_substitutes, tell_summary
+    from dynresp.experiments.reading import read_experiment
+    from dynresp.experiments.result import to_json
+
+    file = read_experiment(experiment)
+    _check_folder(out)
+    with progress() as tell:
+        tell("loading motions", 0, 1)
+        from dynresp.experiments.runner import prepare_run, run_experiment
+
+        loaded = prepare_run(file, experiment.parent, motions, seed)
+        content = run_experiment(loaded, out, tell)
+    substitutes = tell_substitutes(content)
+    if substitutes:
+        typer.echo(f"dynresp: {substitutes}", err=True)
+    for name, what in content.get("files", {}).items():
+        if what.startswith("not written"):
+            typer.echo(f"dynresp: {name} {what}", err=True)
+    if as_json:
+        typer.echo(to_json(content))
+    elif "outcomes" in content:
+        typer.echo(tell_summary(content, out))
+    else:
+        typer.echo(tell_result(content, out))
+    if _all_diverged(content):
+        typer.echo("dynresp: the simulation diverged; see result.json", err=True)
+        raise typer.Exit(1)
+
+
+def _check_folder(out: Path) -> None:
+    """Refuse, before any work, to write where there is a file."""
+    from dynresp.errors import UsageError
+
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"--out: {str(out)!r} is a file; expected a folder for the results")
+
+
+def _all_diverged(content: dict[str, Any]) -> bool:
+    if "outcomes" in content:
+        return bool(content["outcomes"]["diverged"] == content["responses"])
+    return bool(content["happened"]["outcome"] == "diverged")
