@@ -19,6 +19,8 @@
 # (`DYNRESP_MOTIONS`, or `dynresp motions fetch core`), and the motions that dynresp makes itself where it is not.
 
 # %%
+from itertools import pairwise
+
 import numpy as np
 from matplotlib import pyplot as plt
 
@@ -32,7 +34,9 @@ from dynresp.response.respond import CARRY_ON, Responder
 character = default_character()
 library = default_library(character=character)
 walk = load_builtin("walk", character).resampled(30.0)
-print(f"{library.name}: {len(library.reactions)} reactions; base motion: {walk.name}, {walk.duration:.1f} s")
+print(
+    f"{library.name}: {len(library.reactions)} reactions; base motion: {walk.name}, {walk.duration:.1f} s"
+)
 
 # %% [markdown]
 # ## The hit
@@ -44,7 +48,9 @@ responder = Responder(character, library)
 ball = Ball(time=4.0, mass=8.0, speed=8.0, from_deg=15.0, target="chest")
 response = responder.respond([(walk, ball)])[0]
 contact = response.contact
-print(f"first contact: {contact.body}, {contact.force:.0f} N, {contact.time_s:.3f} s after the simulation began")
+print(
+    f"first contact: {contact.body}, {contact.force:.0f} N, {contact.time_s:.3f} s after the simulation began"
+)
 print(f"choice: {response.choice}, window error {response.error:.2f} m")
 
 # %% [markdown]
@@ -57,8 +63,14 @@ print(f"choice: {response.choice}, window error {response.error:.2f} m")
 chosen = response.carry_on if response.choice == CARRY_ON else response.oracle
 surface = chosen.surface(response.choice)
 fig, ax = plt.subplots(figsize=(7, 4))
-image = ax.pcolormesh(surface.entry_frames / 30.0, surface.exit_frames / 30.0, surface.errors, cmap="viridis_r")
-ax.set(xlabel="entry: time in the reaction [s]", ylabel="exit: time after contact [s]", title=response.choice)
+image = ax.pcolormesh(
+    surface.entry_frames / 30.0, surface.exit_frames / 30.0, surface.errors, cmap="viridis_r"
+)
+ax.set(
+    xlabel="entry: time in the reaction [s]",
+    ylabel="exit: time after contact [s]",
+    title=response.choice,
+)
 fig.colorbar(image, label="window error [m]")
 plt.show()
 
@@ -90,12 +102,9 @@ responses = responder.respond(hits)
 carried = np.array([r.choice in (CARRY_ON, None) for r in responses])
 impulse = masses * speeds
 edges = np.array([0, 10, 20, 30, 45, 100])
-shares = [
-    carried[(impulse >= a) & (impulse < b)].mean() if ((impulse >= a) & (impulse < b)).any() else np.nan
-    for a, b in zip(edges[:-1], edges[1:], strict=True)
-]
+shares = [carried[(impulse >= a) & (impulse < b)].mean() for a, b in pairwise(edges)]
 fig, ax = plt.subplots(figsize=(7, 3))
-ax.bar([f"{a} to {b}" for a, b in zip(edges[:-1], edges[1:], strict=True)], shares)
+ax.bar([f"{a} to {b}" for a, b in pairwise(edges)], shares)
 ax.set(xlabel="momentum of the ball [N s]", ylabel="share that carries on", ylim=(0, 1))
 plt.show()
 
@@ -106,6 +115,15 @@ plt.show()
 
 # %%
 figures = [q for q in (measure(r, character) for r in responses) if q is not None]
-for name in ("speed_step_ratio", "root_jump_m", "root_jump_deg", "foot_skate_m", "foot_depth_m", "physics_s"):
+for name in (
+    "speed_step_ratio",
+    "root_jump_m",
+    "root_jump_deg",
+    "foot_skate_m",
+    "foot_depth_m",
+    "physics_s",
+):
     values = np.array([getattr(q, name) for q in figures])
-    print(f"{name:18s} median {np.median(values):7.4f}   95th percentile {np.percentile(values, 95):7.4f}")
+    print(
+        f"{name:18s} median {np.median(values):7.4f}   95th percentile {np.percentile(values, 95):7.4f}"
+    )

@@ -327,8 +327,8 @@ def _prepare_strike(
         axis=1,
     )
     speed = (track[1, :3] - track[0, :3]) * config.fps
-    turn = rotations.multiply(rotations.conjugate(track[0, 3:]), track[1, 3:])
-    spin = rotations.to_rotation_vector(turn) * config.fps
+    turned = rotations.multiply(rotations.conjugate(track[0, 3:]), track[1, 3:])
+    spin = rotations.to_rotation_vector(turned) * config.fps
     return PreparedImpact(
         ImpactorKind.STRIKER,
         start,
