@@ -29,7 +29,8 @@ from dynresp.motion.character import default_character
 from dynresp.motion.library import default_library
 from dynresp.physics.impacts import Ball
 from dynresp.response.quality import measure
-from dynresp.response.respond import CARRY_ON, Responder
+from dynresp.response.respond import Responder
+from dynresp.response.response import CARRY_ON
 
 character = default_character()
 library = default_library(character=character)

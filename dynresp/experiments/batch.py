@@ -15,7 +15,7 @@ from dynresp.experiments.hits import Hit
 from dynresp.experiments.result import OUTCOMES, outcome
 from dynresp.files import replacing
 from dynresp.response.quality import Quality
-from dynresp.response.respond import Response
+from dynresp.response.response import Response
 
 FIGURES = tuple(item.name for item in fields(Quality))
 """Names of the quality figures."""

@@ -13,7 +13,7 @@ from dynresp.experiments.showing import show
 from dynresp.experiments.spec import Artefact, OutputTable
 from dynresp.motion.character import Character
 from dynresp.response.quality import Quality
-from dynresp.response.respond import CARRY_ON, Response
+from dynresp.response.response import CARRY_ON, Response
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, how many are done, and of how many."""

@@ -21,7 +21,7 @@ from dynresp.experiments.hits import Hit
 from dynresp.experiments.showing import Shown
 from dynresp.files import replacing
 from dynresp.response.quality import Quality
-from dynresp.response.respond import CARRY_ON, Response
+from dynresp.response.response import CARRY_ON, Response
 
 _DIGITS = 6
 

@@ -21,7 +21,8 @@ from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.sources import motion_folders
 from dynresp.physics.impacts import prepare
 from dynresp.response.quality import Quality, measure
-from dynresp.response.respond import Responder, Response, ResponseConfig
+from dynresp.response.respond import Responder
+from dynresp.response.response import Response, ResponseConfig
 
 # Hits are answered in bundles of this size, so that memory does not grow with their number.
 _BUNDLE = 100

@@ -11,7 +11,7 @@ from dynresp.motion.character import ROOT, ROOT_QUAT
 from dynresp.motion.motion import Motion, move_poses
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import GRAVITY, Impact, PreparedImpact, Strike
-from dynresp.response.respond import CARRY_ON, Response
+from dynresp.response.response import CARRY_ON, Response
 from dynresp.view.story import Event, MovingSphere, Phase, Story
 
 # A ball is seen coming for this long before its flight is simulated, a fist for less [s].

@@ -15,7 +15,7 @@ from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.ground import clearances, sole_points
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.respond import Response
+from dynresp.response.response import Response
 
 # A motion that stands still has hardly any joint speed steps; a seam is then measured against this
 # [rad/s], about the sway of a standing person.

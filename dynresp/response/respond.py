@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,12 +15,12 @@ from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Impact, PreparedImpact, prepare
-from dynresp.physics.scene import ImpactorKind, PhysicsConfig, Scene
+from dynresp.physics.scene import ImpactorKind, Scene
 from dynresp.physics.simulation import Simulation
-from dynresp.physics.trace import Contact, Divergence, Setup, Trace
+from dynresp.physics.trace import Setup, Trace
 from dynresp.response.oracle import OracleResult, search
+from dynresp.response.response import CARRY_ON, GRAZE_S, Response, ResponseConfig
 from dynresp.response.transition import (
-    TransitionConfig,
     blend_onto,
     blended_targets,
     place_on,
@@ -28,115 +28,10 @@ from dynresp.response.transition import (
 from dynresp.response.windows import (
     LibraryWindows,
     ReactionTrack,
-    WindowErrorConfig,
     library_windows,
     make_windows,
     trace_windows,
 )
-
-CARRY_ON = "carry_on"
-"""Name of the choice to go on with the base motion."""
-
-# Time after contact by which the change of speed tells a graze from a hit [s].
-_GRAZE_S = 0.1
-
-
-@dataclass(frozen=True)
-class ResponseConfig:
-    """Settings of the whole way.
-
-    Attributes:
-        physics: The simulation.
-        window: The search; its frame rate must be the simulation's.
-        transition: The way back.
-        graze_speed: A hit that has changed the speed of the centre of mass over the ground by less
-            than this [m/s], 0.1 s after contact, is a graze: the base motion is carried on at
-            once. A push of 15 N s does that to a
-            man of 73 kg; and a ragdoll in a fast walk that nothing has hit drifts by less in nine
-            cases of ten.
-        carry_on_exit_s: Time after contact at which the base motion must fit to be carried on
-            through a harder hit [s]. A window that begins at the contact still shows the base
-            motion after any hit; by 0.25 s a hit has moved the body, and a ragdoll that nothing
-            has hit has not yet lost its balance.
-        carry_on_max_error: Largest window error [m] with which it is carried on then, also where
-            no reaction fits better: a tenth of a metre for each of 14 bodies.
-        carry_on_slack_s: How much earlier or later than by the clock the base motion may then be
-            entered [s].
-        carry_on_s: How long the base motion is shown to go on after a miss or a hit that is
-            carried on through [s].
-        entry_max_s: Latest time in a reaction at which it is entered [s]. A reaction begins close
-            to its hit; entered much later, the recovery would be shown without what it recovers
-            from.
-        remaining_s: What is left of a reaction where it is entered, at least [s]: the blend, and
-            then enough to be seen.
-    """
-
-    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
-    window: WindowErrorConfig = field(
-        # What is known of a hit 0.1 s after it decides the reaction (Zordan et al. 2007, section
-        # 4.1), so no simulation is left before.
-        default_factory=lambda: WindowErrorConfig(fps=30.0, exit_min_s=0.1)
-    )
-    transition: TransitionConfig = field(default_factory=TransitionConfig)
-    graze_speed: float = 0.2
-    carry_on_exit_s: float = 0.25
-    carry_on_max_error: float = 1.5
-    carry_on_slack_s: float = 0.1
-    carry_on_s: float = 2.5
-    entry_max_s: float = 0.5
-    remaining_s: float = 0.6
-
-    @property
-    def horizon_s(self) -> float:
-        """How long the simulation looks ahead after contact [s]."""
-        latest = max(self.window.exit_max_s, self.carry_on_exit_s, _GRAZE_S)
-        return latest + self.window.window_s
-
-
-@dataclass(frozen=True)
-class Response:
-    """One answer to one hit. Frames are counted in `motion`.
-
-    Attributes:
-        motion: The one continuous motion: base, physics, blend, reaction.
-        start: First simulated frame.
-        contact: First contact, its times from `start`; None where nothing was hit.
-        contact_frame: First frame at or after contact; None likewise.
-        exit: Frame at which the blend begins; None where there was no contact.
-        end: Frame at which the blend has ended and the reaction goes on alone; None likewise.
-        choice: Name of the reaction chosen, or `CARRY_ON`; None without contact.
-        entry: Frame of the reaction clip that was entered; of the base motion, when carried on.
-        error: Window error of the choice [m].
-        errors: Best window error of every reaction and of `CARRY_ON`.
-        oracle: What the search over the library found; None without contact.
-        carry_on: What the search over the base motion found; None without contact.
-        entered: The motion entered, unplaced: the reaction's clip, or the base motion.
-        left: (59,) where the simulation was one frame after the exit; None likewise.
-        joined: (59,) where the reaction was one frame before the end; None likewise.
-        impactor: (frames, 7) pose of ball, fist or striking arm, NaN outside the simulation; None
-            for pushes.
-        prepared: The impact in terms of the simulation.
-        diverged: Set where the simulation blew up; the motion then stops at the last good frame.
-    """
-
-    motion: Motion
-    start: int
-    prepared: PreparedImpact
-    contact: Contact | None = None
-    contact_frame: int | None = None
-    exit: int | None = None
-    end: int | None = None
-    choice: str | None = None
-    entry: int | None = None
-    error: float | None = None
-    errors: dict[str, float] = field(default_factory=dict)
-    oracle: OracleResult | None = None
-    carry_on: OracleResult | None = None
-    entered: Motion | None = None
-    left: FloatArray | None = None
-    joined: FloatArray | None = None
-    impactor: FloatArray | None = None
-    diverged: Divergence | None = None
 
 
 @dataclass(frozen=True)
@@ -308,7 +203,7 @@ class Responder:
             base: The base motion.
             contact: The frame of the base motion at contact.
         """
-        frames = max(1, round(_GRAZE_S * base.fps))
+        frames = max(1, round(GRAZE_S * base.fps))
         share = self.character.masses / self.character.masses.sum()
         times = np.array([contact, contact + frames]) / base.fps
         own = self.character.kinematics(base.sample(times)).centers

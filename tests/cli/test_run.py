@@ -119,7 +119,7 @@ def test_divergence_of_all_is_a_failure(
 ) -> None:
     from dynresp.experiments import runner
     from dynresp.physics.trace import Divergence
-    from dynresp.response.respond import Response
+    from dynresp.response.response import Response
 
     respond_well = runner.Responder.respond
 

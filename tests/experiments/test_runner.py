@@ -124,7 +124,8 @@ def test_a_divergence_is_reported_and_takes_no_other_down(
 ) -> None:
     from dynresp.experiments import runner
     from dynresp.physics.trace import Divergence
-    from dynresp.response.respond import Responder, Response
+    from dynresp.response.respond import Responder
+    from dynresp.response.response import Response
 
     def respond(self: Responder, hits: list[tuple[Motion, Any]], tell: Any) -> list[Response]:
         responses = respond_well(self, hits, tell)

@@ -6,7 +6,7 @@ from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Impact, Punch, Strike, prepare
 from dynresp.physics.scene import PhysicsConfig
-from dynresp.response.respond import Response
+from dynresp.response.response import Response
 
 from .samples import FPS, swaying
 

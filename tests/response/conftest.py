@@ -6,7 +6,8 @@ from dynresp.motion.character import Character
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Impact, Strike
-from dynresp.response.respond import Responder, Response
+from dynresp.response.respond import Responder
+from dynresp.response.response import Response
 from tests.physics.samples import punching, walking
 from tests.response.samples import HITS, bowing, leaning, tiny_library
 

@@ -8,7 +8,7 @@ from dynresp.motion.library import Reaction, ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball, Impact, Punch, Push
-from dynresp.response.respond import Response
+from dynresp.response.response import Response
 from tests.physics.samples import about_y, turned
 
 # A ball so light that nobody feels it.

@@ -23,7 +23,7 @@ from dynresp.response.quality import (
     measure,
     root_shake,
 )
-from dynresp.response.respond import Response
+from dynresp.response.response import Response
 from tests.motion.samples import random_quaternions, smooth_motion
 from tests.oracles import kinematics, quaternions
 from tests.physics.samples import standing, turned, walking

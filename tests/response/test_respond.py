@@ -14,7 +14,8 @@ from dynresp.physics.scene import Scene
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup, Trace
 from dynresp.response.quality import measure
-from dynresp.response.respond import CARRY_ON, Responder, Response, ResponseConfig
+from dynresp.response.respond import Responder
+from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.transition import place_on
 from dynresp.response.windows import ReactionTrack
 from tests.oracles import window_error

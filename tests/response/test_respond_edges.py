@@ -12,7 +12,8 @@ from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Impact, Punch, Push
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.response.quality import measure
-from dynresp.response.respond import CARRY_ON, Responder, Response, ResponseConfig
+from dynresp.response.respond import Responder
+from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.transition import TransitionConfig
 from dynresp.response.windows import WindowErrorConfig
 from tests.physics.samples import about_y, absurd_ball, standing, turned, walking
