@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 
-from dynresp.cli.app import app
+from dynresp.cli.app import INTERRUPTED, app
 
 
 def main() -> None:
@@ -17,4 +17,9 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    app(prog_name="dynresp")
+    try:
+        app(prog_name="dynresp")
+    except KeyboardInterrupt:
+        # One that came where no command could catch it: between two of them, or a second one.
+        sys.stderr.write("dynresp: interrupted\n")
+        sys.exit(INTERRUPTED)
