@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from dynresp.errors import UnknownNameError
 from dynresp.motion import ground
@@ -19,8 +19,8 @@ from dynresp.motion.motion import Label, Motion
 from dynresp.paths import reactions_folder
 
 if TYPE_CHECKING:
-    from dynresp.motion.footing import FootTrack
-    from dynresp.motion.keypose_spec import BuiltinSpec
+    from dynresp.motion.builtin.footing import FootTrack
+    from dynresp.motion.builtin.keypose_spec import BuiltinSpec
     from dynresp.motion.rotations import FloatArray
 
 PREFIX = "built-in: "
@@ -56,13 +56,6 @@ def builtin_folder() -> Path:
 def builtin_names() -> tuple[str, ...]:
     """Slugs of all built-in motions, sorted."""
     return tuple(sorted(file.stem for file in builtin_folder().glob("*.toml")))
-
-
-def strategies() -> tuple[str, ...]:
-    """Slugs of the twelve reaction strategies, in the order of Zordan et al. 2007, section 5."""
-    from dynresp.motion.keypose_spec import Strategy
-
-    return get_args(Strategy)
 
 
 def builtin_info(name: str) -> BuiltinInfo:
@@ -105,7 +98,7 @@ def make_motion(spec: BuiltinSpec, character: Character) -> Motion:
 
 def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
     """Poses (frames, 59) of a file, and where its left and right foot were to be."""
-    from dynresp.motion import footing, gait, keyposes
+    from dynresp.motion.builtin import footing, gait, keyposes
 
     if spec.gait is not None:
         return gait.walk_poses(spec, character)
@@ -132,7 +125,7 @@ def _file_of(name: str) -> Path:
 
 @functools.cache
 def _spec(name: str) -> BuiltinSpec:
-    from dynresp.motion.keypose_spec import read_spec
+    from dynresp.motion.builtin.keypose_spec import read_spec
 
     return read_spec(_file_of(name))
 

@@ -14,23 +14,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from dynresp.errors import SpecError, UnknownNameError
+from dynresp.motion.strategies import Strategy
 
 Side = Literal["left", "right"]
 Kind = Literal["walk", "idle", "guard", "punch", "reaction"]
-Strategy = Literal[
-    "step_forward_small",
-    "step_forward_large",
-    "multiple_steps_forward",
-    "forward_roll",
-    "side_fall",
-    "step_backward_small",
-    "step_backward_large",
-    "multiple_steps_backward",
-    "backward_roll",
-    "upper_body_front",
-    "upper_body_side",
-    "upper_body_back",
-]
 
 MAX_DURATION = 120.0
 """Longest motion that a file may describe [s]."""

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion import ground, legs, rotations
+from dynresp.motion.builtin.keypose_spec import Lying, Stance
 from dynresp.motion.character import Character
-from dynresp.motion.keypose_spec import Lying, Stance
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 
