@@ -31,6 +31,13 @@ ROOT = slice(0, 3)
 ROOT_QUAT = slice(3, 7)
 JOINTS = slice(7, POSE_SIZE)
 
+GEOM_TYPES = (
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_BOX,
+)
+"""Shapes that the bodies of a character may have; `ground.clearances` knows how low these reach."""
+
 # A pose mirrored in the plane y = 0: y of positions, and x and z of quaternions, change sign.
 _MIRROR_POSITION = np.array([1.0, -1.0, 1.0])
 _MIRROR_QUATERNION = np.array([1.0, -1.0, 1.0, -1.0])
@@ -55,6 +62,7 @@ class Character:
     """The ragdoll of `models/ragdoll.xml` as kinematics sees it.
 
     Attributes:
+        file: The MJCF file it was loaded from.
         model: Its MuJoCo model, without floor or servos.
         body_names: 14 names, the pelvis first, parents before children.
         joint_names: 13 ball joints in the order of `qpos`; joint i moves body i + 1.
@@ -76,7 +84,7 @@ class Character:
             MotionError: The model cannot be read, has not the degrees of freedom of the character,
                 or has body frames that do not sit unturned at their joints.
         """
-        file = model_file or paths.models_folder() / "ragdoll.xml"
+        self.file = file = model_file or paths.models_folder() / "ragdoll.xml"
         try:
             self.model = mujoco.MjModel.from_xml_path(str(file))
         except ValueError as error:
@@ -235,6 +243,9 @@ def _check_layout(file: Path, model: mujoco.MjModel) -> None:
             f"{file}: every body needs one joint, at its origin, and a frame aligned with the "
             "world in the rest pose; take out quat, euler or axisangle of bodies and pos of joints"
         )
+    known = {int(kind) for kind in GEOM_TYPES}
+    if not set(model.geom_type.tolist()) <= known:
+        raise MotionError(f"{file}: geoms must be spheres, capsules or boxes; this has others")
 
 
 def _contents(model: mujoco.MjModel) -> bytes:

@@ -21,8 +21,8 @@ class ContactConfig:
     """When a foot counts as standing.
 
     Attributes:
-        height: Its lowest point is at most this high [m].
-        speed: Its lowest point moves at most this fast [m/s].
+        height: Some corner of its sole is at most this high [m],
+        speed: and moves at most this fast [m/s].
         gap_s: Contacts and gaps shorter than this are noise [s].
     """
 
@@ -63,9 +63,7 @@ def _half_extent(model: mujoco.MjModel, geom: int, axes: FloatArray) -> FloatArr
         return np.full(len(axes), size[0])
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
         return np.asarray(size[0] + size[1] * np.abs(up[:, 2]))
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return np.asarray(np.abs(up) @ size)
-    raise NotImplementedError(f"geom type {mujoco.mjtGeom(kind).name} of the character's model")
+    return np.abs(up) @ size
 
 
 def sole_points(character: Character, side: str) -> FloatArray:

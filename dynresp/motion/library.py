@@ -14,10 +14,11 @@ from dynresp.errors import MissingMotionDataError, SpecError, UnknownNameError
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.catalogue import load_sources
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.library_file import MIRRORED, STRATEGIES, Entry, builtin_entries, read_entries
+from dynresp.motion.library_file import MIRRORED, Entry, builtin_entries, read_entries
 from dynresp.motion.load import load_motion
 from dynresp.motion.motion import Label, Motion
 from dynresp.motion.sources import find_motion_file, motion_folders
+from dynresp.motion.strategies import STRATEGIES
 from dynresp.paths import reactions_folder
 
 __all__ = [

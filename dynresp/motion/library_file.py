@@ -14,23 +14,7 @@ from typing import Any
 from dynresp.errors import SpecError
 from dynresp.motion.builtin import builtin_info, builtin_names
 from dynresp.motion.sources import MOTION_SUFFIXES, checked_relative_path
-
-STRATEGIES = (
-    "step_forward_small",
-    "step_forward_large",
-    "multiple_steps_forward",
-    "forward_roll",
-    "side_fall",
-    "step_backward_small",
-    "step_backward_large",
-    "multiple_steps_backward",
-    "backward_roll",
-    "upper_body_front",
-    "upper_body_side",
-    "upper_body_back",
-)
-"""The strategies of Zordan et al. 2007, section 7.1. Front, side and back are where a blow to the
-upper body comes from; forward and backward are where the person goes."""
+from dynresp.motion.strategies import STRATEGIES
 
 MIRRORED = "_mirrored"
 """What the name of a reaction's mirror image ends in."""

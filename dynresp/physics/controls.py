@@ -35,6 +35,7 @@ class Controls:
     Attributes:
         spec: The parts of MuJoCo's state that a row holds (bits of mjtState).
         hold: Column that says whether the pelvis is held to its target, 1 or 0.
+        read_ahead: How many frames of its targets a frame needs, itself included.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -56,7 +57,7 @@ class Controls:
         self._joints_at = self._steps[:, None] + lead
         self._hold_at = self._steps + HOLD_LEAD_S * self._fps
         latest = max(self._joints_at.max(), self._hold_at.max())
-        self._ahead = np.arange(int(np.floor(latest)) + 2)
+        self.read_ahead = int(np.floor(latest)) + 2
 
     def pack(
         self,
@@ -83,7 +84,7 @@ class Controls:
         controls[..., self.hold] = np.asarray(held, dtype=np.float64)[:, None]
         near = np.stack(
             [
-                target[np.minimum(at + self._ahead, len(target) - 1)]
+                target[np.minimum(at + np.arange(self.read_ahead), len(target) - 1)]
                 for target, at in zip(targets, target_frames, strict=True)
             ]
         )

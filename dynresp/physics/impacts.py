@@ -37,8 +37,8 @@ _SPHERE_INERTIA = 0.4
 class Ball:
     """A thrown ball, which flies freely.
 
-    One whose way to a low target would begin in the floor is let go just above it instead: it
-    comes in time and place, but falls a little there (slow and level balls most).
+    One whose way to its target would begin in the floor (a low target, or a slow ball) is let go
+    just above it instead: it comes in time and place, but steeper than asked.
 
     Attributes:
         time: When its centre is due at the target, were nothing in its way [s].
@@ -141,7 +141,7 @@ Impact: TypeAlias = Ball | Punch | Push | Strike
 
 BOUNDS = {
     "time": (0.0, 1e6),
-    "speed": (0.1, 2000.0),
+    "speed": (2.0, 2000.0),
     "mass": (0.01, 200.0),
     "radius": (0.01, 1.0),
     "from_deg": (-720.0, 720.0),

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from dynresp import paths
+from dynresp.errors import UsageError
 from dynresp.motion.character import Character
 from dynresp.physics.servo import ServoConfig, add_servos
 
@@ -56,6 +57,17 @@ class PhysicsConfig:
     substeps: int = 8
     servo: ServoConfig = field(default_factory=ServoConfig)
 
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            UsageError: The frame rate or the number of substeps makes no sense.
+        """
+        if not 1.0 <= self.fps <= 1000.0:
+            raise UsageError(f"fps must be from 1 to 1000, got {self.fps}")
+        if not 1 <= self.substeps <= 1000:
+            raise UsageError(f"substeps must be from 1 to 1000, got {self.substeps}")
+
     @property
     def timestep(self) -> float:
         """Step of the simulation [s]."""
@@ -90,7 +102,7 @@ class Scene:
         spec = mujoco.MjSpec.from_file(str(folder / "scene.xml"))
         spec.option.timestep = self.config.timestep
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-        ragdoll = mujoco.MjSpec.from_file(str(folder / "ragdoll.xml"))
+        ragdoll = mujoco.MjSpec.from_file(str(self.character.file))
         spec.attach(ragdoll, prefix=PREFIX, frame=spec.worldbody.add_frame())
         add_servos(spec, self.character, self.config.servo, PREFIX)
         spec.worldbody.add_body(name="hold", mocap=True)

@@ -13,6 +13,7 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
+from dynresp.errors import UsageError
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 
@@ -62,6 +63,20 @@ class ServoConfig:
     damping_ratio: float = 1.0
     stiffness_floors: Mapping[str, float] = field(default_factory=_stiffness_floors)
     torque_limits: Mapping[str, float] = field(default_factory=_torque_limits)
+
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            UsageError: One is not positive, or a joint has no torque limit.
+        """
+        for name in ("frequency", "damping_ratio"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+        missing = sorted(set(_torque_limits()) - set(self.torque_limits))
+        if missing:
+            raise UsageError(f"torque_limits must name every joint; missing: {', '.join(missing)}")
 
 
 @dataclass(frozen=True)

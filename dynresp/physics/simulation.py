@@ -7,6 +7,7 @@ simulation can be taken back to any frame, bitwise.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import mujoco
@@ -27,7 +28,18 @@ _SENSOR_SIZE = 7
 
 
 class Simulation:
-    """Many hits of one kind, simulated together; each is bitwise what it would be alone."""
+    """Many hits of one kind, simulated together; each is bitwise what it would be alone.
+
+    The first simulation of a process replaces MuJoCo's handler of warnings, which is one for the
+    whole process and would write them to a file in the working folder.
+
+    Attributes:
+        scene: The world.
+        setups: The simulations.
+        fps: Frame rate [1/s].
+        substeps: Steps in a frame.
+        read_ahead: How many frames of its targets a frame needs, itself included.
+    """
 
     def __init__(self, scene: Scene, setups: Sequence[Setup], threads: int = 0) -> None:
         """Put every character and impactor where it starts.
@@ -41,9 +53,10 @@ class Simulation:
         self.setups = list(setups)
         self.fps = scene.config.fps
         self.substeps = scene.config.substeps
-        mujoco.set_mju_user_warning(_ignore_warning)
+        _keep_warnings_out_of_files()
         self._batch = Batch(scene.model, len(self.setups), threads)
         self._controls = Controls(scene)
+        self.read_ahead = self._controls.read_ahead
         self._set_impactors()
         self._set_start()
         # One row of integration state for each frame that has been reached, per simulation.
@@ -75,7 +88,10 @@ class Simulation:
         qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         for i, setup in enumerate(self.setups):
             qpos[i, :POSE_SIZE] = setup.base[0]
-            qvel[i, :VELOCITY_SIZE] = pose_velocities(setup.base[:2], self.fps)[0]
+            velocity = setup.velocity
+            if velocity is None:
+                velocity = pose_velocities(setup.base[:2], self.fps)[0]
+            qvel[i, :VELOCITY_SIZE] = velocity
             if setup.impact.impactor_pose is not None:
                 qpos[i, POSE_SIZE:] = setup.impact.impactor_pose
                 qvel[i, VELOCITY_SIZE:] = setup.impact.impactor_velocity
@@ -186,12 +202,13 @@ class Simulation:
         record: tuple[str, ...],
         frames: Sequence[int],
     ) -> dict[str, npt.NDArray[np.float64]]:
-        # Of each warning the batch holds the last information and the count.
-        before = self._batch.warning[ids, :, 1].copy()
+        # Of each warning the batch holds the last information and the count, which a simulation
+        # that is reset begins anew.
+        self._batch.warning[ids] = 0
         result = self._batch.rollout(
             self.substeps, controls, self._controls.spec, record=record, ids=ids
         )
-        rose = self._batch.warning[ids, :, 1] > before
+        rose = self._batch.warning[ids, :, 1] > 0
         for row in map(int, np.flatnonzero(rose.any(axis=1))):
             kind = mujoco.mjtWarning(int(np.argmax(rose[row]))).name.removeprefix("mjWARN_")
             self._diverged[ids[row]] = Divergence(frames[row], kind)
@@ -275,5 +292,7 @@ class Simulation:
         )
 
 
-def _ignore_warning(message: str) -> None:
-    """Warnings are read from the batch's counters; MuJoCo would write them to a file here."""
+@functools.cache
+def _keep_warnings_out_of_files() -> None:
+    """Warnings are read from the batch's counters; MuJoCo would write them to MUJOCO_LOG.TXT."""
+    mujoco.set_mju_user_warning(lambda message: None)

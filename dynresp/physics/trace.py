@@ -16,12 +16,13 @@ class Setup:
         base: (frames, 59) the base motion from the simulation's first frame on, at its frame
             rate. After its last frame the last pose holds.
         impact: What hits.
-        name: For messages.
+        velocity: (45,) the base motion's velocity at that frame, a row of `qvel`; None takes it
+            from the first two frames of `base`.
     """
 
     base: FloatArray
     impact: PreparedImpact
-    name: str = ""
+    velocity: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Contact:
         frame: First frame at or after the contact.
         body: Name of the body that was hit.
         force: Contact force in the step of contact [N]; of a push, its peak.
-        point: (3,) where [m], world.
+        point: (3,) where [m], world; of a push, the body's centre of mass at the frame before.
     """
 
     time_s: float

@@ -74,8 +74,8 @@ def measure(response: Response, character: Character) -> Quality | None:
     motion = response.motion
     steps = joint_speed_steps(motion)
     at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
-    own = float(np.percentile(joint_speed_steps(response.entered), _PERCENTILE))
-    reference = max(own, _LEAST_REFERENCE)
+    own = joint_speed_steps(response.entered)
+    reference = max(float(np.percentile(own, _PERCENTILE)) if own.size else 0.0, _LEAST_REFERENCE)
     assert response.left is not None
     assert response.joined is not None
     jumps = [

@@ -12,7 +12,7 @@ from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.floor import raise_above
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.library import ReactionLibrary
-from dynresp.motion.motion import Motion
+from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Impact, PreparedImpact, prepare
 from dynresp.physics.scene import ImpactorKind, Scene
@@ -45,6 +45,8 @@ class _Choice:
     error: float
     oracle: OracleResult
     carry_on: OracleResult
+    graze: bool
+    speed_change: float
 
 
 class Responder:
@@ -76,6 +78,7 @@ class Responder:
         if self.config.window.fps != fps or any(r.motion.fps != fps for r in library.reactions):
             raise MotionError(f"simulation, search and library must all run at {fps:g} fps")
         left = round(max(self.config.remaining_s, self.config.transition.blend_s + 2 / fps) * fps)
+        left = max(left, self.config.window.window_frames - 1)
         latest = round(self.config.entry_max_s * fps) + 1
         tracks = [
             self._track(r.name, r.motion.poses, (0, max(1, min(latest, len(r.motion) - left))))
@@ -134,7 +137,10 @@ class Responder:
         """Answer hits that all need the same scene."""
         if kind not in self._scenes:
             self._scenes[kind] = Scene(self.character, kind, self.config.physics)
-        setups = [Setup(base.poses[p.start :], p) for base, p in zip(bases, prepared, strict=True)]
+        setups = [
+            Setup(base.poses[p.start :], p, velocity=_velocity(base, p.start))
+            for base, p in zip(bases, prepared, strict=True)
+        ]
         tell("simulating", 0, len(setups))
         simulation = Simulation(self._scenes[kind], setups, self.threads)
         traces = simulation.look_ahead(self.config.horizon_s)
@@ -166,7 +172,8 @@ class Responder:
 
         # The base motion around the moment at which it must fit.
         contact = prepared.start + trace.contact.frame
-        graze = self._speed_change(states, base, contact) < self.config.graze_speed
+        speed_change = self._speed_change(states, base, contact)
+        graze = speed_change < self.config.graze_speed
         leave_s = window.exit_min_s if graze else self.config.carry_on_exit_s
         leave = round(leave_s * base.fps)
         slack = round(self.config.carry_on_slack_s * base.fps)
@@ -178,18 +185,19 @@ class Responder:
         carry_on = search(late, own)
 
         best, stay = result.best, carry_on.best
-        if graze or stay.error <= min(best.error, self.config.carry_on_max_error):
-            entry = first + stay.entry_frame
-            return _Choice(CARRY_ON, base, stay.exit_frame, entry, stay.error, result, carry_on)
-        motion = self.library.reaction(best.reaction).motion
+        stays = graze or stay.error <= min(best.error, self.config.carry_on_max_error)
+        chosen = stay if stays else best
         return _Choice(
-            best.reaction,
-            motion,
-            best.exit_frame,
-            best.entry_frame,
-            best.error,
-            result,
-            carry_on,
+            name=chosen.reaction,
+            motion=base if stays else self.library.reaction(best.reaction).motion,
+            exit=chosen.exit_frame,
+            # A base motion that ends holds its last pose.
+            entry=min(first + stay.entry_frame, len(base) - 1) if stays else best.entry_frame,
+            error=chosen.error,
+            oracle=result,
+            carry_on=carry_on,
+            graze=graze,
+            speed_change=speed_change,
         )
 
     def _speed_change(self, states: BodyStates, base: Motion, contact: int) -> float:
@@ -228,7 +236,9 @@ class Responder:
             back = contact.frame if self.config.transition.second_pass else exit_frame
             lead = exit_frame - back
             setup = simulation.setups[i]
-            until = np.minimum(np.arange(back, exit_frame + length + 3), len(setup.base) - 1)
+            # As far as the servos read ahead.
+            stop = exit_frame + length + simulation.read_ahead
+            until = np.minimum(np.arange(back, stop), len(setup.base) - 1)
             targets[i] = blended_targets(
                 setup.base[until], choice.motion.poses, choice.entry, lead, lead + length
             )
@@ -291,6 +301,8 @@ class Responder:
             choice=choice.name,
             entry=choice.entry,
             error=choice.error,
+            graze=choice.graze,
+            speed_change=choice.speed_change,
             errors={n: float(e) for n, e in found} | {CARRY_ON: choice.carry_on.best.error},
             oracle=choice.oracle,
             carry_on=choice.carry_on,
@@ -305,6 +317,12 @@ class Responder:
         states = self.character.kinematics(poses[start:])
         after = foot_contacts(self.character, states, base.fps)
         return Motion(poses, base.fps, base.name, np.concatenate([base.contacts[:start], after]))
+
+
+def _velocity(motion: Motion, frame: int) -> FloatArray:
+    """A motion's velocity (45,) at a frame, by the central difference where there is one."""
+    first = max(frame - 1, 0)
+    return pose_velocities(motion.poses[first : frame + 2], motion.fps)[frame - first]
 
 
 def _impactor_track(trace: Trace, start: int, frames: int) -> FloatArray | None:

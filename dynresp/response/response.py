@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
+from dynresp.errors import UsageError
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import PreparedImpact
@@ -64,6 +65,17 @@ class ResponseConfig:
     entry_max_s: float = 0.5
     remaining_s: float = 0.6
 
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            UsageError: One is not finite, or negative; the message names it.
+        """
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, float) and not 0.0 <= value < float("inf"):
+                raise UsageError(f"{item.name} must be at least 0, got {value}")
+
     @property
     def horizon_s(self) -> float:
         """How long the simulation looks ahead after contact [s]."""
@@ -85,6 +97,10 @@ class Response:
         choice: Name of the reaction chosen, or `CARRY_ON`; None without contact.
         entry: Frame of the reaction clip that was entered; of the base motion, when carried on.
         error: Window error of the choice [m].
+        graze: Whether the hit was a graze, so that the base motion is carried on whatever the
+            errors; None without contact.
+        speed_change: What the hit did to the speed of the centre of mass over the ground by 0.1 s
+            after contact [m/s]; None likewise.
         errors: Best window error of every reaction and of `CARRY_ON`.
         oracle: What the search over the library found; None without contact.
         carry_on: What the search over the base motion found; None without contact.
@@ -107,6 +123,8 @@ class Response:
     choice: str | None = None
     entry: int | None = None
     error: float | None = None
+    graze: bool | None = None
+    speed_change: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
     oracle: OracleResult | None = None
     carry_on: OracleResult | None = None

@@ -15,12 +15,12 @@ from dynresp.motion.builtin import (
     load_builtin,
     make_motion,
     make_poses,
-    strategies,
 )
+from dynresp.motion.builtin.footing import Sole
+from dynresp.motion.builtin.keypose_spec import BuiltinSpec, read_spec
 from dynresp.motion.character import Character
-from dynresp.motion.footing import Sole
-from dynresp.motion.keypose_spec import BuiltinSpec, read_spec
 from dynresp.motion.motion import FEET
+from dynresp.motion.strategies import STRATEGIES
 
 NAMES = builtin_names()
 GRAVITY = 9.81
@@ -57,8 +57,8 @@ def test_base_motions_and_every_strategy_are_there() -> None:
     for name in ("walk", "idle", "guard", "punch"):
         assert kinds[name] == name
     given = [str(builtin_info(name).strategy) for name in NAMES if kinds[name] == "reaction"]
-    assert sorted(given) == sorted(strategies())
-    assert len(strategies()) == 12
+    assert sorted(given) == sorted(STRATEGIES)
+    assert len(STRATEGIES) == 12
 
 
 def test_all_are_made_quickly(character: Character) -> None:

@@ -156,10 +156,6 @@ def test_missing_skeleton_counts_as_missing(tmp_path: Path) -> None:
         load_library(path, [tmp_path])
 
 
-def test_strategies_are_those_of_the_built_in_motions() -> None:
-    assert builtin.strategies() == STRATEGIES
-
-
 def test_built_in_library_stands_in(character: Character, tmp_path: Path) -> None:
     library = default_library([tmp_path], character)
     assert library.name == BUILTIN

@@ -61,6 +61,18 @@ def test_a_push_can_blow_up_too(scene_of: SceneMaker, base: Motion) -> None:
     assert [trace.diverged is not None for trace in traces] == [False, True, False]
 
 
+def test_it_is_reported_each_time(scene_of: SceneMaker, base: Motion) -> None:
+    """MuJoCo resets a simulation that blew up, and its count of warnings with it."""
+    push = beyond_bounds(Push(1.0), force=1e9)
+    simulation = simulation_of(scene_of(ImpactorKind.NONE), base, [push])
+    first = simulation.look_ahead(0.3)[0]
+    assert first.diverged is not None
+    for _ in range(3):
+        again = simulation.follow([0], [0], [base.poses[:30]], 12)[0]
+        assert again.diverged is not None
+        assert np.abs(again.poses[:, :3]).max() < 10.0
+
+
 def test_all_may_blow_up(scene_of: SceneMaker, base: Motion) -> None:
     traces = simulation_of(scene_of(ImpactorKind.PROJECTILE), base, [_ABSURD] * 3).look_ahead(0.3)
     assert all(trace.diverged is not None for trace in traces)

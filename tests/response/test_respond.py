@@ -26,7 +26,8 @@ def _simulated(character: Character, base: Motion, response: Response) -> tuple[
     """The look-ahead of a response, simulated once more and alone."""
     config = ResponseConfig()
     scene = Scene(character, response.prepared.kind, config.physics)
-    setup = Setup(base.poses[response.start :], response.prepared)
+    velocity = base.velocities()[response.start]
+    setup = Setup(base.poses[response.start :], response.prepared, velocity)
     simulation = Simulation(scene, [setup], 1)
     return simulation, simulation.look_ahead(config.horizon_s)[0]
 

@@ -1,0 +1,28 @@
+"""Motions that this project makes itself from key poses; they stand in for motion capture.
+
+`reactions/builtin/` holds them as TOML files. The way of the data: a file is read and checked
+(`keypose_spec`), its keys become curves and poses (`keyposes`, `gait` for the walk), and the feet
+are locked where they stand (`footing`).
+"""
+
+from dynresp.motion.builtin.motions import (
+    PREFIX,
+    BuiltinInfo,
+    builtin_folder,
+    builtin_info,
+    builtin_names,
+    load_builtin,
+    make_motion,
+    make_poses,
+)
+
+__all__ = [
+    "PREFIX",
+    "BuiltinInfo",
+    "builtin_folder",
+    "builtin_info",
+    "builtin_names",
+    "load_builtin",
+    "make_motion",
+    "make_poses",
+]
