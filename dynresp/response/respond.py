@@ -172,7 +172,7 @@ class Responder:
 
         # The base motion around the moment at which it must fit.
         contact = prepared.start + trace.contact.frame
-        speed_change = self._speed_change(states, base, contact)
+        speed_change = self._speed_change(states, base, contact, prepared.push_duration_s)
         graze = speed_change < self.config.graze_speed
         leave_s = window.exit_min_s if graze else self.config.carry_on_exit_s
         leave = round(leave_s * base.fps)
@@ -200,22 +200,25 @@ class Responder:
             speed_change=speed_change,
         )
 
-    def _speed_change(self, states: BodyStates, base: Motion, contact: int) -> float:
+    def _speed_change(self, states: BodyStates, base: Motion, contact: int, push_s: float) -> float:
         """What a hit has done to the speed of the centre of mass over the ground [m/s].
 
         The difference of the simulation's and the base motion's mean velocities over 0.1 s from
-        contact on.
+        contact on; after a push that lasts, over the last 0.1 s of it that the search can see.
 
         Args:
             states: The simulated bodies from contact on.
             base: The base motion.
             contact: The frame of the base motion at contact.
+            push_s: How long a push lasts [s], 0 for other hits.
         """
         frames = max(1, round(GRAZE_S * base.fps))
+        last = max(frames, round(min(push_s, self.config.window.exit_max_s) * base.fps))
+        first = last - frames
         share = self.character.masses / self.character.masses.sum()
-        times = np.array([contact, contact + frames]) / base.fps
+        times = np.array([contact + first, contact + last]) / base.fps
         own = self.character.kinematics(base.sample(times)).centers
-        moved = states.centers[frames] - states.centers[0] - (own[1] - own[0])
+        moved = states.centers[last] - states.centers[first] - (own[1] - own[0])
         return float(np.linalg.norm((share @ moved)[:2]) * base.fps / frames)
 
     def _finish(

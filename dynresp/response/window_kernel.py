@@ -17,6 +17,7 @@ polynomial Q it needs no branch and no library call.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -71,7 +72,17 @@ def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
     return wp * distance + wt * (math.sqrt(u) * q)
 
 
-@njit(_SIGNATURE, cache=True, nogil=True, fastmath=_FASTMATH)
+def _compiled(function: Any) -> Any:
+    """Compile for `_SIGNATURE`; kept for the next process where a folder can be written to."""
+    options = {"nogil": True, "fastmath": _FASTMATH}
+    try:
+        return njit(_SIGNATURE, cache=True, **options)(function)
+    except RuntimeError:
+        # Numba found no place for its cache: an installation and a home that are read-only.
+        return njit(_SIGNATURE, **options)(function)
+
+
+@_compiled
 def search_kernel(  # type: ignore[no-untyped-def]
     trace,
     exits,
