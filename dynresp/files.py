@@ -26,6 +26,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
     Raises:
         DynrespError: The folder cannot be made or the file cannot be written.
+        OSError: The block's, where it is about another file.
     """
     target = Path(path)
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
@@ -34,6 +35,10 @@ def replacing(path: Path | str) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, target)
     except OSError as error:
+        # A full disk names no file, and a folder that cannot be made is a parent.
+        about = error.filename
+        if about is not None and Path(os.fsdecode(about)) not in (temporary, *temporary.parents):
+            raise
         raise DynrespError(
             f"cannot write {target}: {error.strerror or error}; choose another folder or free space"
         ) from error

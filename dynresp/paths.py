@@ -71,6 +71,26 @@ def examples_folder() -> Path:
     return PACKAGE_FOLDER / "examples"
 
 
+def expanded(path: Path | str, named_by: str) -> Path:
+    """A path that a user named, its leading `~` or `~user` replaced by the home folder.
+
+    Args:
+        path: As it was given.
+        named_by: The option, variable or key that named it, for the message.
+
+    Raises:
+        UsageError: There is no such user.
+    """
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        home = Path(path).parts[0]
+        raise UsageError(
+            f"{named_by}: {str(path)!r}: {home!r} is nobody's home folder on this machine; write "
+            "the whole path"
+        ) from None
+
+
 def cache_folder() -> Path:
     """Folder where dynresp keeps what it fetched or computed for this user; may not exist yet.
 
@@ -86,7 +106,7 @@ def cache_folder() -> Path:
     given = os.environ.get(CACHE_VARIABLE, "")
     if not given:
         return platformdirs.user_cache_path("dynresp", appauthor=False)
-    folder = Path(os.path.abspath(os.path.expanduser(given)))
+    folder = Path(os.path.abspath(expanded(given, CACHE_VARIABLE)))
     if folder.exists() and not folder.is_dir():
         raise UsageError(
             f"{CACHE_VARIABLE} is {given!r}, which is not a folder; "

@@ -37,3 +37,24 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DynrespError, match="cannot write"), replacing(tmp_path / "file" / "x"):
         pass
+
+
+def test_a_full_disk_is_told(tmp_path: Path) -> None:
+    with (
+        pytest.raises(DynrespError, match=r"cannot write .*x: No space left"),
+        replacing(tmp_path / "x"),
+    ):
+        raise OSError(28, "No space left on device")
+
+
+def test_an_error_about_another_file_stays_what_it_is(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="other"), replacing(tmp_path / "x"):
+        (tmp_path / "other").read_bytes()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_of_that_name(tmp_path: Path) -> None:
+    (tmp_path / "x").mkdir()
+    with pytest.raises(DynrespError, match="cannot write"), replacing(tmp_path / "x") as temporary:
+        temporary.touch()
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]

@@ -62,3 +62,16 @@ def test_cache_that_is_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setenv(paths.CACHE_VARIABLE, str(tmp_path / "file"))
     with pytest.raises(UsageError, match=r"DYNRESP_CACHE is .* not a folder"):
         paths.cache_folder()
+
+
+def test_home_folders_are_filled_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert paths.expanded("~/a", "--motions") == tmp_path / "a"
+    assert paths.expanded(Path("a/~b"), "--motions") == Path("a/~b")
+    with pytest.raises(
+        UsageError, match=r"--motions: '~nobody\.here/a': '~nobody\.here' is nobody"
+    ):
+        paths.expanded("~nobody.here/a", "--motions")
+    monkeypatch.setenv(paths.CACHE_VARIABLE, "~nobody.here/a")
+    with pytest.raises(UsageError, match=paths.CACHE_VARIABLE):
+        paths.cache_folder()

@@ -8,18 +8,35 @@ from __future__ import annotations
 
 import sys
 
-from dynresp.cli.app import INTERRUPTED, app
+from dynresp.cli.interruption import INTERRUPTED, Interruption
 
 
 def main() -> None:
     """Run the command that `sys.argv` names, and exit."""
+    interruption = Interruption()
+    try:
+        try:
+            interruption.watch()
+            _run()
+        finally:
+            interruption.ignore()
+    except BaseException:
+        # Once more: the signal may have come just before it was ignored.
+        interruption.ignore()
+        # An interruption can surface as anything, such as a module that cannot be imported.
+        if not interruption.came:
+            raise
+    if interruption.came:
+        sys.stderr.write("dynresp: interrupted\n")
+        sys.exit(INTERRUPTED)
+
+
+def _run() -> None:
+    # Imported here, where an interruption is caught.
+    from dynresp.cli.app import app
+
     # A terminal that cannot show a character gets a question mark in its place.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    try:
-        app(prog_name="dynresp")
-    except KeyboardInterrupt:
-        # One that came where no command could catch it: between two of them, or a second one.
-        sys.stderr.write("dynresp: interrupted\n")
-        sys.exit(INTERRUPTED)
+    app(prog_name="dynresp")

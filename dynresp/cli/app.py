@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from typing import Annotated, Any
 
 import typer
@@ -9,9 +10,8 @@ from typer.core import TyperGroup
 
 from dynresp import __version__
 from dynresp.cli import bench, demo, motions, reactions, run
+from dynresp.cli.interruption import INTERRUPTED
 from dynresp.errors import DynrespError
-
-INTERRUPTED = 130
 
 
 class Commands(TyperGroup):
@@ -25,8 +25,14 @@ class Commands(TyperGroup):
             typer.echo(f"dynresp: {error}", err=True)
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
-            typer.echo("dynresp: interrupted", err=True)
+            # `dynresp.cli.main` says it.
             raise typer.Exit(INTERRUPTED) from None
+        except OSError as error:
+            # A reader that has gone, as of `dynresp ... | head`, is typer's to deal with.
+            if error.errno == errno.EPIPE:
+                raise
+            typer.echo(f"dynresp: {error}", err=True)
+            raise typer.Exit(DynrespError.exit_code) from None
         except MemoryError:
             typer.echo("dynresp: not enough memory on this machine for that", err=True)
             raise typer.Exit(DynrespError.exit_code) from None

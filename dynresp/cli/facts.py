@@ -12,12 +12,9 @@ from dynresp.motion.character import default_character
 from dynresp.motion.ground import clearances
 from dynresp.motion.load import LoadOptions
 from dynresp.motion.motion import FEET, Motion
-from dynresp.motion.readers import SkeletonMotion, read_motion_file
+from dynresp.motion.readers import read_motion_file
 from dynresp.motion.retarget import t_pose_frames
 from dynresp.motion.segments import find_segments
-
-# A unit so small that no skeleton, told in it, is too large to be read [m].
-_TINY = 1e-4
 
 
 def facts(motion: Motion, file: Path | None, told: LoadOptions) -> dict[str, Any]:
@@ -59,28 +56,13 @@ def _file_facts(file: Path | None, told: LoadOptions) -> dict[str, Any] | None:
     if file is None or file.suffix.lower() == ".npz":
         return None
     found = read_motion_file(file, asf_path=told.asf, unit=told.unit, up=told.up, fps=told.fps)
-    if file.suffix.lower() in (".json", ".txt"):
-        unit, up = 1.0, "y"
-    else:
-        unit, up = _unit_and_up(found, file, told)
     limb = find_segments(found).limbs["left"]
     rest = found.rest_positions()
     leg = sum(
         float(np.linalg.norm(rest[limb[a]] - rest[limb[b]]))
         for a, b in (("hip", "knee"), ("knee", "ankle"))
     )
-    return {"joints": len(found.names), "unit_m": unit, "up": up, "leg_m": leg}
-
-
-def _unit_and_up(found: SkeletonMotion, file: Path, told: LoadOptions) -> tuple[float, str]:
-    """Unit [m] and up axis of a file, by comparing it with itself in a known unit and up axis."""
-    plain = read_motion_file(file, asf_path=told.asf, unit=_TINY, up="z", fps=told.fps)
-    bones = np.abs(plain.offsets)
-    unit = _TINY * float(np.linalg.norm(found.offsets) / np.linalg.norm(plain.offsets))
-    # The up axis comes last in the world; with "z" up, nothing is moved.
-    scaled = np.abs(found.offsets[:, 2]) * _TINY / unit
-    misfit = np.linalg.norm(bones - scaled[:, None], axis=0)
-    return float(f"{unit:.6g}"), "xyz"[int(np.argmin(misfit))]
+    return {"joints": len(found.names), "unit_m": found.unit_m, "up": found.up, "leg_m": leg}
 
 
 def _ranges(flags: npt.NDArray[np.bool_], fps: float) -> list[list[float]]:

@@ -40,8 +40,9 @@ def fetch(
     from dynresp.motion.fetch import FetchProgress, plan_fetch
     from dynresp.motion.fetch import fetch as fetch_files
     from dynresp.motion.sources import MOTIONS_VARIABLE
+    from dynresp.paths import expanded
 
-    folder = None if motions is None else motions.expanduser()
+    folder = None if motions is None else expanded(motions, "--motions")
     plan = plan_fetch(collection, folder)
     for line in _licences(plan):
         typer.echo(line, err=True)

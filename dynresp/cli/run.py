@@ -42,10 +42,12 @@ def answer(
         as_json: Print `result.json` or `summary.json` instead of text.
 
     Raises:
-        typer.Exit: With code 1, where every simulation diverged.
+        typer.Exit: With code 1, where every simulation diverged, or a file could not be written;
+            a video on a machine that cannot draw is none.
         DynrespError: It could not be done.
     """
     from dynresp.cli.telling import tell_result, tell_substitutes, tell_summary
+    from dynresp.experiments.folder import WRITTEN, is_failure
     from dynresp.experiments.reading import read_experiment
     from dynresp.experiments.result import to_json
 
@@ -60,8 +62,8 @@ def answer(
     substitutes = tell_substitutes(content)
     if substitutes:
         typer.echo(f"dynresp: {substitutes}", err=True)
-    for name, what in content.get("files", {}).items():
-        if what.startswith("not written"):
+    for name, what in content["files"].items():
+        if what != WRITTEN:
             typer.echo(f"dynresp: {name} {what}", err=True)
     if as_json:
         typer.echo(to_json(content))
@@ -71,6 +73,8 @@ def answer(
         typer.echo(tell_result(content, out))
     if _all_diverged(content):
         typer.echo("dynresp: the simulation diverged; see result.json", err=True)
+        raise typer.Exit(1)
+    if any(is_failure(what) for what in content["files"].values()):
         raise typer.Exit(1)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dynresp.experiments.report import WRITTEN, spoken
+from dynresp.experiments.folder import RESULT, SUMMARY, TABLE, WRITTEN, hit_folder
+from dynresp.experiments.report import spoken
 
 
 def tell_result(content: dict[str, Any], out: Path) -> str:
@@ -34,12 +35,13 @@ def tell_result(content: dict[str, Any], out: Path) -> str:
         lines += [
             f"  physics    {quality['physics_s']:.2f} s",
             f"  seams      joint speed step {quality['speed_step_ratio']:.2f} of the clip's own, "
-            f"root jump {100 * quality['root_jump_m']:.2f} cm, {quality['root_jump_deg']:.2f} deg",
+            f"root jump {100 * quality['root_jump_m']:.2f} cm, {quality['root_jump_deg']:.2f} deg, "
+            f"shake {100 * quality['root_shake_m']:.2f} cm, {quality['root_shake_deg']:.2f} deg",
             f"  ground     foot {100 * quality['foot_depth_m']:.1f} cm deep, body "
             f"{100 * quality['body_depth_m']:.1f} cm, skate {100 * quality['foot_skate_m']:.1f} cm",
         ]
     written = [name for name, what in content["files"].items() if what == WRITTEN]
-    lines.append(f"  written    {out}: {', '.join(['result.json', *written])}")
+    lines.append(f"  written    {out}: {', '.join([RESULT, *written])}")
     return "\n".join(lines)
 
 
@@ -70,8 +72,9 @@ def tell_summary(content: dict[str, Any], out: Path) -> str:
             f"{target['limit']:g} in {target['share_within']:.1%} "
             f"(wanted {target['share_wanted']:.0%})"
         )
-    shown = [f"hit_{number:05d}" for number in content["shown"]]
-    lines.append(f"  written    {out}: {', '.join(['summary.json', 'table.csv', *shown])}")
+    table = [name for name in (TABLE,) if content["files"][name] == WRITTEN]
+    shown = [hit_folder(number) for number in content["shown"]]
+    lines.append(f"  written    {out}: {', '.join([SUMMARY, *table, *shown])}")
     return "\n".join(lines)
 
 
@@ -102,8 +105,6 @@ def _outcome(happened: dict[str, Any]) -> str:
         return f"reaction {spoken(happened['choice'])}"
     if what == "diverged":
         return f"diverged ({happened['diverged']['warning']})"
-    words = {
-        "miss": "missed; the base motion goes on",
-        "carry on": "carries on with the base motion",
-    }
-    return words[what]
+    if what == "miss":
+        return "missed; the base motion goes on"
+    return "carries on with the base motion" + (", grazed" if happened["graze"] else "")

@@ -40,6 +40,8 @@ TARGETS = (
     Target("speed_step_ratio", 1.5, 0.95),
     Target("root_jump_m", 0.01, 0.95),
     Target("root_jump_deg", 1.0, 0.95),
+    Target("root_shake_m", 0.01, 0.95),
+    Target("root_shake_deg", 1.0, 0.95),
     Target("foot_depth_m", 0.02, 0.95),
     Target("body_depth_m", 0.04, 0.95),
     # A share of one half: the median. Wholly under physics, and until the blend has ended.
@@ -57,6 +59,8 @@ def row(hit: Hit, response: Response, quality: Quality | None) -> dict[str, Any]
         cells["force_n"] = response.contact.force
     if response.exit is not None and response.contact_frame is not None:
         fps = response.motion.fps
+        cells["speed_change_m_s"] = response.speed_change
+        cells["graze"] = response.graze
         cells["choice"] = response.choice
         cells["error_m"] = response.error
         cells["exit_after_contact_s"] = (response.exit - response.contact_frame) / fps

@@ -28,6 +28,7 @@ from dynresp.motion.library import (
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
 from dynresp.motion.sources import find_motion_file
+from dynresp.paths import expanded
 
 BUILTIN_PREFIX = "builtin:"
 """How the name of a built-in motion begins in an experiment file."""
@@ -102,10 +103,11 @@ def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str 
     Raises:
         MotionFileError: It can only be a file, and there is none.
         SpecError: The path leads out of the motions folders.
+        UsageError: It begins with the home folder of nobody.
     """
     if name.startswith(BUILTIN_PREFIX):
         return name.removeprefix(BUILTIN_PREFIX)
-    given = Path(name).expanduser()
+    given = expanded(name, "motion")
     own = beside / given
     # os.path.isfile answers False where Path.is_file raises, as for a name that is too long.
     if os.path.isfile(own):
@@ -122,7 +124,7 @@ def _load(cut: MotionCut, found: Path | str, character: Character) -> Motion:
         unit=cut.unit_m,
         up=cut.up,
         fps=cut.fps,
-        asf=None if cut.asf is None else found.parent / cut.asf,
+        asf=None if cut.asf is None else found.parent / expanded(cut.asf, "asf"),
         flat_floor=not cut.uneven_floor,
         trim_t_poses=cut.trim_t_pose,
     )
@@ -188,7 +190,7 @@ def take_library(
     if not which.endswith(".toml"):
         names = ("core", "full", BUILTIN, "a library file (.toml)")
         raise UnknownNameError("library", which, names)
-    return load_library(beside / Path(which).expanduser(), folders, character, fps)
+    return load_library(beside / expanded(which, "library"), folders, character, fps)
 
 
 def about_library(library: ReactionLibrary, which: str) -> dict[str, Any]:

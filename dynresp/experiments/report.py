@@ -6,7 +6,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-from dynresp.errors import DynrespError
+from dynresp.experiments.folder import (
+    RESULT,
+    WRITTEN,
+    NothingToShowError,
+    attempt,
+    clear_response,
+)
 from dynresp.experiments.hits import Hit
 from dynresp.experiments.result import describe, outcome, write_json
 from dynresp.experiments.showing import show
@@ -47,11 +53,12 @@ def write_response(
         progress: Told the stage, how many are done, and of how many.
 
     Returns:
-        The content of `result.json`; under `files` it says what was written, and why not where
-        something was asked for and could not be.
+        The content of `result.json`, which is written whatever becomes of the others; under
+        `files` it says what was written, and why not where something was asked for and is not
+        there.
 
     Raises:
-        DynrespError: A file cannot be written.
+        DynrespError: `result.json` cannot be written.
     """
     shown = show(response, hit.impact, output.lead_in_s, title, _subtitle(hit, response))
     story = shown.story
@@ -95,33 +102,14 @@ def write_response(
     names: Sequence[str] = [name for name in get_args(Artefact) if name in output.write]
     for done, name in enumerate(names):
         progress(f"writing {name}", done, len(names))
-        files[name] = _try(writers[name], folder / name)
-    for name in get_args(Artefact):
-        if files.get(name) != WRITTEN:
-            (folder / name).unlink(missing_ok=True)
+        files[name] = attempt(writers[name], folder / name)
+    there = [name for name, what in files.items() if what == WRITTEN]
+    left = clear_response(folder, [RESULT, *there])
+    files |= {name: what for name, what in left.items() if name not in files}
     content = {**about, **describe(hit, response, quality, shown), "files": files}
-    write_json(content, folder / "result.json")
-    progress("writing result.json", len(names), len(names))
+    write_json(content, folder / RESULT)
+    progress(f"writing {RESULT}", len(names), len(names))
     return content
-
-
-WRITTEN = "written"
-"""What `files` in `result.json` says of a file that is there."""
-
-
-class NothingToShowError(DynrespError):
-    """There is nothing that this file could show; the message says why."""
-
-
-def _try(write: Callable[[Path], None], path: Path) -> str:
-    """Write a file, or say why this machine or this response has none."""
-    from dynresp.view.video import RenderingUnavailableError
-
-    try:
-        write(path)
-    except (RenderingUnavailableError, NothingToShowError) as error:
-        return f"not written: {error}"
-    return WRITTEN
 
 
 def _write_alignment(path: Path, response: Response, title: str) -> None:

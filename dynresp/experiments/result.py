@@ -65,6 +65,8 @@ def happened(response: Response, shown: Shown) -> dict[str, Any]:
         said["diverged"] = {"time_s": frame / fps, "warning": response.diverged.warning}
     if response.exit is None or response.end is None or response.contact_frame is None:
         return said
+    said["speed_change_m_s"] = response.speed_change
+    said["graze"] = response.graze
     said["choice"] = response.choice
     said["error_m"] = response.error
     said["alignment"] = {

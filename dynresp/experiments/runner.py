@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dynresp.errors import SpecError, UsageError
+from dynresp.errors import MotionError, SpecError
 from dynresp.experiments import batch
+from dynresp.experiments.folder import (
+    RESULT,
+    SUMMARY,
+    TABLE,
+    attempt,
+    clear_batch,
+    hit_folder,
+)
 from dynresp.experiments.hits import Hit, draw_hits
 from dynresp.experiments.motions import Taken, about_library, take_library, take_motion
 from dynresp.experiments.report import Progress, write_response
 from dynresp.experiments.result import versions, write_json
-from dynresp.experiments.spec import Experiment, SettingsTable, StrikerCut, StrikeTable
+from dynresp.experiments.settings import in_force, response_config
+from dynresp.experiments.spec import Experiment, StrikerCut, StrikeTable
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.sources import motion_folders
-from dynresp.physics.impacts import prepare
+from dynresp.physics.impacts import Ball, prepare
 from dynresp.response.quality import Quality, measure
 from dynresp.response.respond import Responder
 from dynresp.response.response import Response, ResponseConfig
@@ -103,7 +112,8 @@ class Run:
         return {
             **told,
             "library": about_library(self.library, self.experiment.library.which),
-            "settings": self.experiment.settings.model_dump(exclude_none=True),
+            "settings": in_force(self.config),
+            "output": self.experiment.output.model_dump(),
             "character": self.character.identity,
             "versions": versions(),
         }
@@ -127,7 +137,8 @@ def prepare_run(
 
     Raises:
         MissingMotionDataError: A motion is not on this machine.
-        DynrespError: A motion or a library cannot be read, or a value does not fit.
+        SpecError: A value does not fit the motions, such as the time of a hit.
+        DynrespError: A motion or a library cannot be read.
     """
     character = default_character()
     folders = motion_folders(motions)
@@ -151,44 +162,29 @@ def prepare_run(
             )
     library = take_library(experiment.library.which, folders, beside, fps, character)
     chosen = experiment.experiment.seed if seed is None else seed
-    run = Run(experiment, chosen, character, base, striker, library, config, threads)
+    try:
+        run = Run(experiment, chosen, character, base, striker, library, config, threads)
+    except MotionError as error:
+        # A clip of the library that is shorter than a window.
+        raise SpecError(f"settings.window_s: {error}") from None
     _check_times(run)
     return run
-
-
-def response_config(settings: SettingsTable) -> ResponseConfig:
-    """Settings of an experiment over the defaults.
-
-    Raises:
-        SpecError: They contradict each other.
-    """
-    given = settings.model_dump(exclude_none=True)
-    config = ResponseConfig()
-
-    def part(of: Any, *keys: str) -> Any:
-        return replace(of, **{key: given[key] for key in keys if key in given})
-
-    try:
-        config = replace(
-            config,
-            physics=part(config.physics, "substeps"),
-            window=part(config.window, "window_s", "exit_min_s", "exit_max_s", "entry_step_s"),
-            transition=part(config.transition, "blend_s", "second_pass"),
-        )
-    except UsageError as error:
-        raise SpecError(f"settings: {error}") from None
-    result: ResponseConfig = part(config, "carry_on_s", "remaining_s")
-    return result
 
 
 def _check_times(run: Run) -> None:
     """Refuse hits before or after the base motion, before anything is simulated."""
     hits = run.hits(range(run.experiment.experiment.count))
-    for hit in (min(hits, key=_time), max(hits, key=_time)):
+    if not isinstance(hits[0].impact, Ball):
+        # What is no ball needs as long before in all hits, so the earliest and the latest will do.
+        hits = [min(hits, key=_time), max(hits, key=_time)]
+    for hit in hits:
         try:
             prepare(hit.impact, run.base.motion, run.character, run.config.physics)
         except SpecError as error:
-            raise SpecError(f"impact.{str(error).replace('time:', 'time_s:', 1)}") from None
+            which = f" of hit {hit.number}" if run.experiment.experiment.count > 1 else ""
+            what, _, why = str(error).partition(":")
+            key = "impact.time_s" if what == "time" else f"impact.{what}"
+            raise SpecError(f"{key}{which}:{why}") from None
 
 
 def _time(hit: Hit) -> float:
@@ -204,18 +200,19 @@ def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dic
         progress: Told the stage, how many are done, and of how many.
 
     Returns:
-        The content of `result.json`; of a batch, of `summary.json`.
+        The content of `result.json`; of a batch, of `summary.json`. What an earlier run left in
+        the folder is removed, so that all of dynresp's files there belong together.
 
     Raises:
-        DynrespError: A file cannot be written.
+        DynrespError: `result.json` or `summary.json` cannot be written.
     """
     tell = progress or (lambda stage, done, of: None)
     table = run.experiment.experiment
     about = run.about()
 
-    def write(answer: Answer, folder: Path, title: str) -> dict[str, Any]:
+    def write(answer: Answer, where: Path, title: str) -> dict[str, Any]:
         return write_response(
-            folder, title, answer.hit, answer.response, answer.quality, about,
+            where, title, answer.hit, answer.response, answer.quality, about,
             run.experiment.output, run.character, tell,
         )  # fmt: skip
 
@@ -229,12 +226,21 @@ def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dic
         rows.append(batch.row(answer.hit, answer.response, answer.quality))
         if answer.hit.number in shown:
             picked.append(answer)
+    files = clear_batch(out, shown)
+    files[TABLE] = attempt(lambda path: batch.write_table(rows, path), out / TABLE)
     for answer in picked:
         number = answer.hit.number
-        write(answer, out / f"hit_{number:05d}", f"{table.name}, hit {number}")
-    batch.write_table(rows, out / "table.csv")
-    summary = {**about, "shown": shown, **batch.summarise(rows)}
-    write_json(summary, out / "summary.json")
+        written: dict[str, str] = {}
+
+        def hit(path: Path, answer: Answer = answer, written: dict[str, str] = written) -> None:
+            title = f"{table.name}, hit {answer.hit.number}"
+            written |= write(answer, path.parent, title)["files"]
+
+        name = hit_folder(number)
+        files[f"{name}/{RESULT}"] = attempt(hit, out / name / RESULT)
+        files |= {f"{name}/{file}": what for file, what in written.items()}
+    summary = {**about, "shown": shown, **batch.summarise(rows), "files": files}
+    write_json(summary, out / SUMMARY)
     return summary
 
 

@@ -145,7 +145,7 @@ class BallTable(ImpactTable):
     kind: Literal["ball"]
     mass_kg: Annotated[Number, number(0.05, 200.0, "kg")] = 6.0
     radius_m: Annotated[Number, number(0.02, 0.5, "m")] = 0.12
-    speed_m_s: Annotated[Number, number(0.5, 30.0, "m/s")] = 8.0
+    speed_m_s: Annotated[Number, number(2.0, 30.0, "m/s")] = 8.0
     elevation_deg: Elevation = 0.0
     target: Body = "chest"
     height_m: Height = None
@@ -158,7 +158,7 @@ class PunchTable(ImpactTable):
     kind: Literal["punch"]
     mass_kg: Annotated[Number, number(0.05, 50.0, "kg")] = 2.9
     radius_m: Annotated[Number, number(0.02, 0.2, "m")] = 0.05
-    speed_m_s: Annotated[Number, number(0.5, 20.0, "m/s")] = 9.0
+    speed_m_s: Annotated[Number, number(2.0, 20.0, "m/s")] = 9.0
     elevation_deg: Elevation = 0.0
     target: Body = "head"
     height_m: Height = None
@@ -199,10 +199,14 @@ class SettingsTable(Strict):
 
     blend_s: Annotated[float | None, fixed(0.05, 2.0, "s")] = None
     second_pass: bool | None = None
-    window_s: Annotated[float | None, fixed(0.05, 2.0, "s")] = None
+    # The shortest reactions of the full library last a little longer.
+    window_s: Annotated[float | None, fixed(0.05, 0.8, "s")] = None
     exit_min_s: Annotated[float | None, fixed(0.0, 3.0, "s")] = None
     exit_max_s: Annotated[float | None, fixed(0.0, 3.0, "s")] = None
     entry_step_s: Annotated[float | None, fixed(0.01, 1.0, "s")] = None
+    entry_max_s: Annotated[float | None, fixed(0.0, 60.0, "s")] = None
+    graze_speed_m_s: Annotated[float | None, fixed(0.0, 10.0, "m/s")] = None
+    carry_on_max_error_m: Annotated[float | None, fixed(0.0, 100.0, "m")] = None
     carry_on_s: Annotated[float | None, fixed(0.0, 60.0, "s")] = None
     remaining_s: Annotated[float | None, fixed(0.0, 60.0, "s")] = None
     substeps: Annotated[int | None, whole(4, 100)] = None

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 from dynresp.errors import MotionError, MotionFileError
 from dynresp.motion.character import Character, default_character
@@ -15,6 +17,9 @@ from dynresp.motion.retarget import RetargetConfig, retarget, trim_t_poses
 
 # Motions kept in memory; the whole development collection is about 150 MB.
 _KEPT = 64
+
+# Of each file: its path, when it was changed [ns], and its size [bytes].
+_Stamps: TypeAlias = tuple[tuple[str, int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,8 @@ def load_motion(
 ) -> Motion:
     """Read a motion file, lay it onto the character and set it on the floor.
 
-    A file that has been loaded is kept in memory and read again only when it has changed.
+    A file that has been loaded is kept in memory and read again only when it, or the skeleton
+    of an AMC file, has changed.
 
     Args:
         path: A BVH, AMC, DeepMimic or .npz file.
@@ -58,17 +64,50 @@ def load_motion(
     """
     character = character or default_character()
     options = options or LoadOptions()
+    if options.asf is not None:
+        options = replace(options, asf=options.asf.resolve())
+    resolved = path.resolve()
     try:
-        changed = path.stat().st_mtime_ns
+        stamps = _stamps(resolved, options.asf)
     except OSError as error:
         raise MotionFileError(f"{path}: cannot be read ({error.strerror})") from error
-    return _load(path.resolve(), changed, character, options)
+    return _load(resolved, stamps, character, options)
+
+
+def _stamps(path: Path, asf: Path | None) -> _Stamps:
+    """What changes with the motion file and with every skeleton that an AMC file may take.
+
+    Args:
+        path: The motion file, resolved.
+        asf: The skeleton that was told, resolved.
+
+    Raises:
+        OSError: The motion file is not there.
+    """
+    files = [path]
+    if asf is not None:
+        files.append(asf)
+    elif path.suffix.lower() == ".amc":
+        for folder in (path.parent, path.parent.parent):
+            with suppress(OSError):
+                files += sorted(f for f in folder.iterdir() if f.suffix.lower() == ".asf")
+    stamps = []
+    for file in files:
+        try:
+            found = file.stat()
+        except OSError:
+            # That a skeleton is missing is the reader's to say.
+            if file is path:
+                raise
+            continue
+        stamps.append((str(file), found.st_mtime_ns, found.st_size))
+    return tuple(stamps)
 
 
 @functools.lru_cache(maxsize=_KEPT)
-def _load(path: Path, changed: int, character: Character, options: LoadOptions) -> Motion:
-    # `changed` is part of the cache's key alone.
-    del changed
+def _load(path: Path, stamps: _Stamps, character: Character, options: LoadOptions) -> Motion:
+    # The stamps are part of the cache's key alone.
+    del stamps
     if path.suffix.lower() == ".npz":
         if (options.unit, options.up, options.fps, options.asf) != (None, None, None, None):
             raise MotionFileError(

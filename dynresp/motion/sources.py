@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from dynresp.errors import SpecError, UsageError
-from dynresp.paths import cache_folder
+from dynresp.paths import cache_folder, expanded
 
 MOTIONS_VARIABLE = "DYNRESP_MOTIONS"
 """Environment variable that names the motions folder, or several with `os.pathsep` between."""
@@ -135,13 +135,13 @@ def list_motion_files(folder: Path) -> list[Path]:
 
 def _existing_folder(folder: Path, named_by: str) -> Path:
     """Return the folder, or say that what the user named is not there."""
-    expanded = folder.expanduser()
-    if not os.path.isdir(expanded):
-        what = "is a file" if os.path.isfile(expanded) else "does not exist"
+    found = expanded(folder, named_by)
+    if not os.path.isdir(found):
+        what = "is a file" if os.path.isfile(found) else "does not exist"
         raise UsageError(
             f"{named_by}: {str(folder)!r} {what}; expected an existing folder of motion files."
         )
-    return expanded
+    return found
 
 
 def _refuse_unreadable(error: OSError) -> None:

@@ -239,7 +239,8 @@ class _Strip:
                         color=_INK, fontweight="bold")  # fmt: skip
             color = _INK if moment.phase is None else PHASE_COLORS[moment.phase]
             figure.text(center, y - 0.17 / height, word, ha="center", va="top", fontsize=8,
-                        color=shapes.mix(color, (0.0, 0.0, 0.0), 0.2))  # fmt: skip
+                        color=shapes.mix(color, (0.0, 0.0, 0.0), 0.2),
+                        parse_math=False)  # fmt: skip
 
     def _heading(self, figure: Figure, height: float) -> None:
         """Title and subtitle to the left, the colours of the phases to the right of the latter."""
@@ -248,9 +249,10 @@ class _Strip:
         side = _MARGIN / figure.get_figwidth()
         title = self.story.title
         figure.text(side, 1 - 0.12 / height, title, va="top", fontweight="bold", color=_INK,
-                    fontsize=min(12.0, 12.0 * 88 / max(len(title), 1)))  # fmt: skip
+                    fontsize=min(12.0, 12.0 * 88 / max(len(title), 1)),
+                    parse_math=False)  # fmt: skip
         figure.text(side, 1 - 0.36 / height, self.story.subtitle, va="top", fontsize=8.5,
-                    color=_FAINT_INK)  # fmt: skip
+                    color=_FAINT_INK, parse_math=False)  # fmt: skip
         shown = {moment.phase for moment in self.moments}
         handles = [
             Line2D([], [], ls="", marker="o", ms=5.5, color=PHASE_COLORS[name], label=name)

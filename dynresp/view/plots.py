@@ -102,7 +102,7 @@ def write_alignment(
     _space(figure, grid[1], errors, exits, entries, chosen)
     if ranking:
         _bars(figure.add_subplot(grid[2]), ranking, chosen_name, label)
-    figure.suptitle(title, x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK)
+    _heading(figure, title)
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png")
 
@@ -132,9 +132,15 @@ def write_ranking(
     figure = _figure(6.4, 1.2 + 0.21 * min(max(shown, 1), _MOST_BARS))
     label = "best window error" + (f" [{unit}]" if unit else "")
     _bars(figure.add_subplot(), ranking, chosen_name, label)
-    figure.suptitle(title, x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK)
+    _heading(figure, title)
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png")
+
+
+def _heading(figure: Figure, title: str) -> None:
+    # A dollar sign in a title is one: nothing here is mathematics.
+    figure.suptitle(title, x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK,
+                    parse_math=False)  # fmt: skip
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -181,7 +187,7 @@ def _map(
     axes.set_ylabel("exit: time under physics after contact [s]", fontsize=8.5)
     axes.tick_params(labelsize=8)
     bar = figure.colorbar(image, ax=axes, pad=0.02)
-    bar.set_label(label, fontsize=8.5)
+    bar.set_label(label, fontsize=8.5, parse_math=False)
     bar.ax.tick_params(labelsize=8)
 
 
@@ -234,14 +240,15 @@ def _bars(axes: Axes, ranking: Sequence[RankedReaction], chosen_name: str, label
     colors = [_BAR if reaction.name == chosen_name else _OTHER_BAR for reaction in shown]
     errors = [reaction.error for reaction in shown]
     axes.barh(rows, errors, color=colors, height=0.72)
-    axes.set_yticks(rows, [_short(reaction.name) for reaction in shown], fontsize=7.5)
+    names = [_short(reaction.name) for reaction in shown]
+    axes.set_yticks(rows, names, fontsize=7.5, parse_math=False)
     for tick, reaction in zip(axes.get_yticklabels(), shown, strict=True):
         tick.set_fontweight("bold" if reaction.name == chosen_name else "normal")
     for row, error in zip(rows, errors, strict=True):
         axes.text(error, float(row), f" {error:.3g}", va="center", fontsize=7, color=_INK)
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set_xlim(0, 1.16 * max(max(errors), 1e-12))
-    axes.set_xlabel(label, fontsize=8.5)
+    axes.set_xlabel(label, fontsize=8.5, parse_math=False)
     axes.tick_params(axis="x", labelsize=8)
     axes.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):

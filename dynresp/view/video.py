@@ -8,11 +8,14 @@ fails the next way is tried; this process goes on whatever happens there.
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +29,7 @@ from dynresp.view.cast import Cast
 from dynresp.view.moments import camera_yaw
 from dynresp.view.shapes import Color, Mesh
 from dynresp.view.story import Story
+from dynresp.view.video_worker import PROGRESS
 
 GL_VARIABLE = "MUJOCO_GL"
 """Environment variable by which a user tells MuJoCo how to draw; it is tried first."""
@@ -90,11 +94,10 @@ def write_video(
     fps = min(story.motion.fps, 60.0) if fps is None else fps
     if not 1.0 <= fps <= 240.0:
         raise UsageError(f"a video's frame rate must be 1 to 240, got {fps}")
-    config = config or VideoConfig()
+    arrays = _script(story, size, fps, config or VideoConfig())
     failures: list[str] = []
-    with tempfile.TemporaryDirectory(prefix="dynresp-video-") as folder, replacing(path) as video:
-        script = Path(folder) / "script.npz"
-        np.savez(script, allow_pickle=False, **_script(story, size, fps, config))
+    with _temporary_folder() as folder, replacing(path) as video:
+        script = _save(folder, arrays)
         for way in _ways():
             failure = _work(script, video, way, progress)
             if failure is None:
@@ -105,6 +108,40 @@ def write_video(
             "Ubuntu install libosmesa6, or libegl1 and libgl1, and try again; recording and "
             "pictures do not need them."
         )
+
+
+@contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    """A folder that is gone when the block ends.
+
+    Raises:
+        DynrespError: There is no place for it.
+    """
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="dynresp-video-"))
+    except OSError as error:
+        raise _no_space(error) from error
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _save(folder: Path, arrays: dict[str, FloatArray]) -> Path:
+    """Write what the worker reads."""
+    script = folder / "script.npz"
+    try:
+        np.savez(script, allow_pickle=False, **arrays)
+    except OSError as error:
+        raise _no_space(error) from error
+    return script
+
+
+def _no_space(error: OSError) -> DynrespError:
+    return DynrespError(
+        f"cannot write temporary files: {error.strerror or error}; free space there, or name "
+        "another folder by the environment variable TMPDIR"
+    )
 
 
 def _ways() -> list[str]:
@@ -128,16 +165,22 @@ def _work(
     environment["PYTHONPATH"] = os.pathsep.join(
         [package, *filter(None, [environment.get("PYTHONPATH")])]
     )
-    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as complaints:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "dynresp.view.video_worker", str(script), str(video.resolve())],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=complaints,
-            text=True,
-            env=environment,
-            cwd=script.parent,
-        )
+    words = [sys.executable, "-m", "dynresp.view.video_worker", str(script), str(video.resolve())]
+    complained = script.with_name("complaints.txt")
+    with complained.open("w+", encoding="utf-8", errors="replace") as complaints:
+        try:
+            process = subprocess.Popen(
+                words,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=complaints,
+                encoding="utf-8",
+                errors="replace",
+                env=environment,
+                cwd=script.parent,
+            )
+        except OSError as error:
+            return f"no process could be started ({error.strerror or error})"
         assert process.stdout is not None
         stalled = threading.Event()
 
@@ -150,9 +193,9 @@ def _work(
         try:
             for line in process.stdout:
                 watch.cancel()
-                done, total = (int(word) for word in line.split())
-                if progress:
-                    progress(done, total)
+                told = re.fullmatch(rf"{PROGRESS} (\d+) (\d+)\s*", line)
+                if told and progress:
+                    progress(int(told[1]), int(told[2]))
                 watch = threading.Timer(_STALL_S, stop)
                 watch.start()
             code = process.wait()

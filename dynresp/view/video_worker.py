@@ -1,8 +1,8 @@
 """Draws a video in a process of its own: `python -m dynresp.view.video_worker SCRIPT.npz OUT.mp4`.
 
-`dynresp.view.video` starts it with `MUJOCO_GL` set, since MuJoCo reads that once, on import. Each
-line on standard output is frames done and frames in all; why it failed is the last line on standard
-error.
+`dynresp.view.video` starts it with `MUJOCO_GL` set, since MuJoCo reads that once, on import. A line
+on standard output that begins with `PROGRESS` is frames done and frames in all, others are of
+drivers and mean nothing; why it failed is the last line on standard error.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp import paths
+
+PROGRESS = "dynresp-video"
+"""First word of a line that tells progress."""
 
 # Frames between two lines on standard output.
 _REPORT_EVERY = 5
@@ -81,7 +84,7 @@ def main(script_file: str, video_file: str) -> None:
                 renderer.update_scene(data, camera)
                 film.send(np.ascontiguousarray(renderer.render()))
                 if (number + 1) % _REPORT_EVERY == 0 or number + 1 == total:
-                    print(number + 1, total, flush=True)
+                    print(PROGRESS, number + 1, total, flush=True)
         finally:
             film.close()
 

@@ -34,6 +34,17 @@ def test_show_finds_what_a_foreign_file_is(world: Path, dynresp: Command) -> Non
     assert facts["file"]["leg_m"] == pytest.approx(0.83, abs=0.05)
 
 
+def test_show_tells_the_unit_and_axis_of_a_file_as_it_was_told(
+    world: Path, dynresp: Command
+) -> None:
+    made = dynresp("motions", "export", world / "stand.npz", "--out", world / "bvh").stdout.strip()
+    told = ("--unit", 1.1, "--up", "y")
+    facts = json.loads(dynresp("motions", "show", made, *told, "--json").stdout)
+    assert facts["file"]["unit_m"] == 1.1
+    assert facts["file"]["up"] == "y"
+    assert facts["file"]["leg_m"] == pytest.approx(0.91, abs=0.06)
+
+
 def test_show_draws(world: Path, dynresp: Command) -> None:
     result = dynresp("motions", "show", "builtin:walk", "--out", world / "shown")
     assert result.exit_code == 0, result.stderr

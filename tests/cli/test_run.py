@@ -61,7 +61,16 @@ def test_results_are_told_in_words(world: Path, dynresp: Command) -> None:
     file, out = quick(world), world / "out"
     result = dynresp("run", file, "--out", out, "--motions", world / "motions")
     assert result.exit_code == 0, result.stderr
-    for word in ("A test", "contact", "outcome", "alignment", "seams", "ground", "result.json"):
+    for word in (
+        "A test",
+        "contact",
+        "outcome",
+        "alignment",
+        "seams",
+        "shake",
+        "ground",
+        "result.json",
+    ):
         assert word in result.stdout
 
 
@@ -71,7 +80,13 @@ def test_a_batch_is_told_in_words(world: Path, dynresp: Command) -> None:
     file.write_text(text.replace("seed = 3", "count = 3\nshow = 1"), encoding="utf-8")
     result = dynresp("run", file, "--out", world / "out", "--motions", world / "motions")
     assert result.exit_code == 0, result.stderr
-    for word in ("outcomes", "speed_step_ratio at most 1.5", "summary.json", "table.csv"):
+    for word in (
+        "outcomes",
+        "speed_step_ratio at most 1.5",
+        "root_shake_m",
+        "summary.json",
+        "table.csv",
+    ):
         assert word in result.stdout
     result = dynresp("run", file, "--out", world / "o", "--motions", world / "motions", "--json")
     assert json.loads(result.stdout)["responses"] == 3
@@ -137,6 +152,26 @@ def test_divergence_of_all_is_a_failure(
     assert result.exit_code == 1
     assert "diverged (BADQVEL)" in result.stdout
     assert (world / "out" / "motion.npz").exists()
+
+
+def test_what_could_not_be_written_is_a_failure(world: Path, dynresp: Command) -> None:
+    file, out = quick(world, '"motion.npz", "motion.bvh"'), world / "out"
+    (out / "motion.bvh").mkdir(parents=True)
+    result = dynresp("run", file, "--out", out, "--motions", world / "motions", "--json")
+    assert result.exit_code == 1
+    assert "dynresp: motion.bvh failed: cannot write" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert json.loads(result.stdout)["files"]["motion.npz"] == "written"
+    assert (out / "result.json").exists()
+
+
+def test_nobodys_home_folder(world: Path, dynresp: Command) -> None:
+    file = quick(world)
+    words = ("run", file, "--out", world / "out", "--motions", "~nobody.here/motions")
+    result = dynresp(*words)
+    assert result.exit_code == 2
+    assert "(--motions): '~nobody.here/motions'" in result.stderr
+    assert "nobody's home folder" in result.stderr
 
 
 @pytest.mark.slow

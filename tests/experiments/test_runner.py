@@ -9,7 +9,8 @@ import pytest
 from dynresp.errors import DynrespError, MissingMotionDataError, SpecError, UnknownNameError
 from dynresp.experiments.reading import read_experiment
 from dynresp.experiments.result import to_json
-from dynresp.experiments.runner import chosen_hits, prepare_run, response_config, run_experiment
+from dynresp.experiments.runner import chosen_hits, prepare_run, run_experiment
+from dynresp.experiments.settings import in_force, response_config
 from dynresp.experiments.spec import SettingsTable
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
@@ -192,17 +193,119 @@ def test_the_other_motion_is_taken_for_want_of_the_first(world: Path) -> None:
 
 
 def test_settings_reach_their_place() -> None:
-    given = {"blend_s": 0.5, "second_pass": True, "exit_max_s": 0.7, "window_s": 0.4,
-             "carry_on_s": 1.0, "substeps": 10}  # fmt: skip
+    given = {"blend_s": 0.5, "second_pass": True, "exit_min_s": 0.2, "exit_max_s": 0.7,
+             "window_s": 0.4, "entry_step_s": 0.1, "entry_max_s": 0.3, "remaining_s": 0.9,
+             "graze_speed_m_s": 0.4, "carry_on_max_error_m": 2.0, "carry_on_s": 1.0,
+             "substeps": 10}  # fmt: skip
+    assert set(given) == set(SettingsTable.model_fields)
     config = response_config(SettingsTable(**given))
     assert config.transition.blend_s == 0.5
     assert config.transition.second_pass
+    assert config.window.exit_min_s == 0.2
     assert config.window.exit_max_s == 0.7
     assert config.window.window_s == 0.4
+    assert config.window.entry_step_s == 0.1
+    assert config.entry_max_s == 0.3
+    assert config.remaining_s == 0.9
+    assert config.graze_speed == 0.4
+    assert config.carry_on_max_error == 2.0
     assert config.carry_on_s == 1.0
     assert config.physics.substeps == 10
-    with pytest.raises(SpecError, match="settings: exit_max_s"):
+    told = in_force(config)
+    assert {key: told[key] for key in given} == given
+    with pytest.raises(SpecError, match=r"settings\.exit_max_s"):
         response_config(SettingsTable(exit_min_s=0.6, exit_max_s=0.2))
+
+
+def test_settings_in_force_are_told_whether_given_or_not(world: Path) -> None:
+    edit(world, "[output]\n", "[settings]\ngraze_speed_m_s = 0.1\n\n[output]\nwrite = []\n")
+    content = run(world)
+    assert content["settings"]["graze_speed_m_s"] == 0.1
+    assert content["settings"]["blend_s"] == pytest.approx(1 / 3)
+    assert content["settings"]["fixed"]["servo"]["damping_ratio"] > 0
+    assert content["output"]["lead_in_s"] == 1.5
+    assert content["happened"]["graze"] is False
+    assert content["happened"]["speed_change_m_s"] > 0.1
+
+
+def test_a_graze_is_told(world: Path) -> None:
+    edit(world, "[output]\n", "[settings]\ngraze_speed_m_s = 9.0\n\n[output]\nwrite = []\n")
+    happened = run(world)["happened"]
+    assert happened["outcome"] == "carry on"
+    assert happened["graze"] is True
+
+
+def test_a_window_longer_than_a_reaction_is_named(world: Path) -> None:
+    library = world / "library.toml"
+    text = library.read_text(encoding="utf-8")
+    library.write_text(text.replace("[0, 60]", "[0, 20]"), encoding="utf-8")
+    edit(world, "[output]\n", "[settings]\nwindow_s = 0.8\n\n[output]\nwrite = []\n")
+    with pytest.raises(SpecError, match=r"settings\.window_s: reaction 'bend_back': has 20 frames"):
+        run(world)
+
+
+def test_a_ball_that_needs_longer_is_named_before_anything_is_simulated(world: Path) -> None:
+    edit(world, "seed = 3", "seed = 3\ncount = 40")
+    # A slow ball is let go 0.82 m away: it needs 0.41 s, fast ones 0.2 s.
+    edit(world, "speed_m_s = 7", "speed_m_s = { choice = [2, 7] }")
+    edit(world, "time_s = 1.0", "time_s = { choice = [0.3, 1.0] }")
+    with pytest.raises(SpecError, match=r"impact\.time_s of hit \d+: the impact is due at 0\.3 s"):
+        run(world)
+    assert not (world / "out").exists()
+
+
+def break_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dynresp.view import filmstrip
+
+    def fail(*words: object) -> None:
+        raise ValueError("Usage of double\nscripts")
+
+    monkeypatch.setattr(filmstrip, "write_filmstrip", fail)
+
+
+def test_a_picture_that_fails_costs_nothing_else(
+    world: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_pictures(monkeypatch)
+    edit(world, "[output]\n", '[output]\nwrite = ["filmstrip.png", "motion.npz", "motion.bvh"]\n')
+    (world / "out" / "motion.bvh").mkdir(parents=True)
+    content = run(world)
+    assert content["files"]["motion.npz"] == "written"
+    assert content["files"]["filmstrip.png"] == "failed: ValueError: Usage of double scripts"
+    assert content["files"]["motion.bvh"].startswith("failed: cannot write")
+    text = (world / "out" / "result.json").read_text(encoding="utf-8")
+    assert json.loads(text)["files"] == content["files"]
+
+
+def test_a_picture_that_fails_in_a_batch_is_told_in_the_summary(
+    world: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_pictures(monkeypatch)
+    edit(world, "seed = 3", "seed = 3\ncount = 2\nshow = 2")
+    edit(world, "[output]\n", '[output]\nwrite = ["filmstrip.png"]\n')
+    (world / "out" / "hit_00001" / "result.json").mkdir(parents=True)
+    files = run(world)["files"]
+    assert files["table.csv"] == "written"
+    assert files["hit_00000/result.json"] == "written"
+    assert files["hit_00000/filmstrip.png"].startswith("failed: ValueError")
+    assert files["hit_00001/result.json"].startswith("failed: cannot write")
+
+
+def test_all_files_of_a_folder_belong_together(world: Path) -> None:
+    edit(world, "[output]\n", '[output]\nwrite = ["motion.npz"]\n')
+    out = world / "out"
+    run(world)
+    edit(world, "seed = 3", "seed = 3\ncount = 9\nshow = 2")
+    run(world)
+    first = [f"hit_{n:05d}" for n in chosen_hits(3, 9, 2)]
+    assert sorted(path.name for path in out.iterdir()) == [*first, "summary.json", "table.csv"]
+    run(world, seed=4)
+    second = [f"hit_{n:05d}" for n in chosen_hits(4, 9, 2)]
+    assert second != first
+    assert sorted(path.name for path in out.iterdir()) == [*second, "summary.json", "table.csv"]
+    edit(world, "count = 9\nshow = 2", "count = 1")
+    run(world)
+    assert sorted(path.name for path in out.iterdir()) == ["motion.npz", "result.json"]
 
 
 def test_shown_hits_are_chosen_by_the_seed() -> None:

@@ -11,7 +11,7 @@ import pytest
 from dynresp.errors import DynrespError
 from dynresp.motion.motion import Motion
 from dynresp.view.filmstrip import FilmstripConfig, settle, spread, write_filmstrip
-from dynresp.view.story import Story
+from dynresp.view.story import Event, Story
 from tests.view.samples import story_of, striding
 
 SMALL = FilmstripConfig(width_px=700, moments=5)
@@ -110,3 +110,10 @@ def test_numbers_stay_finite_for_a_figure_lying_down(tmp_path: Path) -> None:
     lying = story_of(Motion(poses, motion.fps))
     write_filmstrip(lying, tmp_path / "a.png", SMALL)
     assert np.isfinite(matplotlib.image.imread(tmp_path / "a.png")).all()
+
+
+def test_dollar_signs_are_no_mathematics(tmp_path: Path) -> None:
+    text = "price $\\foo{$ up"
+    told = story_of(striding(30, 1.3), title=text, subtitle=text, events=[Event(text, 0.3)])
+    write_filmstrip(told, tmp_path / "a.png", SMALL)
+    assert (tmp_path / "a.png").exists()

@@ -57,3 +57,33 @@ def test_ranking(tmp_path: Path) -> None:
     with pytest.raises(MotionError, match="no reaction"):
         write_ranking(tmp_path / "c.png", [RankedReaction("no", np.inf)], "no")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+@pytest.mark.parametrize("text", ["price $\\foo{$ up", "one $ and $ two"])
+def test_dollar_signs_are_no_mathematics(
+    tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from matplotlib.figure import Figure
+
+    drawn: list[Figure] = []
+    save = Figure.savefig
+
+    def savefig(self: Figure, *args: object, **options: object) -> None:
+        drawn.append(self)
+        save(self, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
+    ranking = [RankedReaction(text, 1.0), RankedReaction("roll", 3.0)]
+    write_alignment(
+        tmp_path / "a.png", bowl(), EXITS, ENTRIES, 0.1, 0.3, text, unit=text, ranking=ranking,
+        chosen_name=text,
+    )  # fmt: skip
+    write_ranking(tmp_path / "b.png", ranking, text, text, unit=text)
+    for figure in drawn:
+        assert not [t for t in figure.findobj(has_mathematics) if text in t.get_text()]
+
+
+def has_mathematics(artist: object) -> bool:
+    from matplotlib.text import Text
+
+    return isinstance(artist, Text) and artist.get_parse_math()

@@ -9,7 +9,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
+from dynresp.errors import DynrespError, UsageError
 from dynresp.view import video
 from dynresp.view.story import Story
 from dynresp.view.video import RenderingUnavailableError, write_video
@@ -98,3 +98,41 @@ def test_sizes_that_make_no_video(tmp_path: Path, story: Story, size: tuple[int,
 def test_rates_that_make_no_video(tmp_path: Path, story: Story) -> None:
     with pytest.raises(UsageError, match="frame rate"):
         write_video(story, tmp_path / "a.mp4", fps=0.0)
+
+
+def test_stray_lines_of_drivers_mean_nothing(
+    tmp_path: Path, story: Story, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    says = (
+        r"printf 'libGL: hello\n1 2 3\n\377\376\n\ndynresp-video x y\ndynresp-video 5 30\n'; "
+        'printf film > "$4"'
+    )
+    monkeypatch.setattr(video.sys, "executable", fake_python(tmp_path, says))
+    seen: list[tuple[int, int]] = []
+    file = tmp_path / "out" / "a.mp4"
+    write_video(story, file, (64, 64), progress=lambda done, of: seen.append((done, of)))
+    assert file.read_text() == "film"
+    assert seen == [(5, 30)]
+
+
+def test_no_process_can_be_started(
+    tmp_path: Path, story: Story, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(video.sys, "executable", str(tmp_path / "gone"))
+    with pytest.raises(RenderingUnavailableError, match="no process could be started"):
+        write_video(story, tmp_path / "a.mp4", (64, 64))
+
+
+def test_no_room_for_temporary_files(
+    tmp_path: Path, story: Story, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*words: object, **options: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(video.np, "savez", full)
+    with pytest.raises(DynrespError, match="temporary files: No space left"):
+        write_video(story, tmp_path / "a.mp4", (64, 64))
+    monkeypatch.setattr(video.tempfile, "mkdtemp", full)
+    with pytest.raises(DynrespError, match="temporary files: No space left"):
+        write_video(story, tmp_path / "a.mp4", (64, 64))
+    assert not list(tmp_path.iterdir())

@@ -9,6 +9,7 @@ w x y z, or an angle [rad] where the joint is a hinge.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +110,7 @@ def read_deepmimic(path: str | Path, *, fps: float | None = None) -> SkeletonMot
             rotations[:, joint] = multiply(rotations[:, parent], local[:, joint])
     offsets = np.array([offset for _, _, offset, *_ in (*_HUMANOID, *_ENDS)])
     # A quarter turn about X: Y becomes Z, Z (the right) becomes -Y, and X stays forward.
-    return to_world(
+    motion = to_world(
         path,
         names=names,
         parents=parents,
@@ -120,6 +121,8 @@ def read_deepmimic(path: str | Path, *, fps: float | None = None) -> SkeletonMot
         unit=1.0,
         up="z",
     )
+    # As the file has it; it was turned here.
+    return replace(motion, up="y")
 
 
 def _quarter_turn(vectors: FloatArray) -> FloatArray:

@@ -75,6 +75,8 @@ class SkeletonMotion:
             (frames, joints, 4).
         fps: Frames per second.
         name: Name of the motion.
+        unit_m: Metres per unit of the file it comes from; None where there is none.
+        up: "x", "y" or "z", the axis of that file that points up; None likewise.
 
     Raises:
         MotionError: If shapes disagree, a value is not finite or out of bounds, a parent does not
@@ -88,6 +90,8 @@ class SkeletonMotion:
     rotations: FloatArray
     fps: float
     name: str
+    unit_m: float | None = None
+    up: str | None = None
 
     def __post_init__(self) -> None:
         """Check everything once, and freeze the arrays."""
@@ -194,4 +198,6 @@ class SkeletonMotion:
             rotations=normalize(multiply(self.rotations, conjugate(rest))),
             fps=self.fps,
             name=self.name,
+            unit_m=self.unit_m,
+            up=self.up,
         )

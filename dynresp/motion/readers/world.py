@@ -28,7 +28,10 @@ _TO_Z_UP = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}
 
 _FEET = re.compile(r"foot|feet|ankle|toe", re.IGNORECASE)
 _HEAD = re.compile(r"head|neck", re.IGNORECASE)
+_TRUNK = re.compile(r"spine|chest|torso|thorax", re.IGNORECASE)
 _SAMPLES = 64
+# Part of the frames in which a person stands at least along the axis that is up.
+_SOMETIMES = 0.05
 
 
 def check_told(unit: float | None, up: str | None, fps: float | None) -> None:
@@ -95,6 +98,8 @@ def to_world(
             rotations=rotations[:, :, [0, *(1 + axis for axis in axes)]],
             fps=fps,
             name=path.stem,
+            unit_m=unit,
+            up=up.lower(),
         )
     except MotionError as error:
         raise fail(path, f"{error} (unit {unit:g} m, {up} up)") from error
@@ -160,7 +165,9 @@ def find_up(
     """Which axis of the file points up: the one along which the head is above the feet.
 
     Looked for in frames spread over the motion, then, if the person lies or crawls, in the rest
-    pose. Where neither tells, Y, the custom of all formats read here.
+    pose. Where neither tells, Y, the custom of all formats read here. A person who lies most of the
+    time, always the same way round, seems to stand on the wall; so an axis along which the rest
+    pose stands, and the person too for some of the time, comes first.
 
     Args:
         names: Names of the joints.
@@ -176,29 +183,41 @@ def find_up(
     if not head or not feet:
         return "y"
     sample = np.linspace(0, len(rotations) - 1, min(_SAMPLES, len(rotations))).astype(int)
-    rest = np.zeros((1, len(parents), 4))
-    rest[..., 0] = 1.0
-    for at, turns in ((root_positions[sample], rotations[sample]), (np.zeros((1, 3)), rest)):
+    still = np.zeros((1, len(parents), 4))
+    still[..., 0] = 1.0
+    bodies = []
+    for at, turns in ((root_positions[sample], rotations[sample]), (np.zeros((1, 3)), still)):
         positions = forward_kinematics(parents, offsets, at, turns)
-        body = positions[:, head].mean(axis=1) - positions[:, feet].mean(axis=1)
-        length = np.linalg.norm(body, axis=1).mean()
-        mean = body.mean(axis=0)
-        for axis, other in ((1, 2), (2, 1)):
-            # Clearly upright: within about 45 degrees, on the mean over the motion.
-            if mean[axis] > max(0.7 * length, 1.5 * abs(mean[other])):
-                return UPS[axis]
-    return "y"
+        bodies.append(positions[:, head].mean(axis=1) - positions[:, feet].mean(axis=1))
+    moving, rest = (_upright_along(body) for body in bodies)
+    if rest is not None and rest != moving:
+        often = np.mean([_upright_along(frame[None]) == rest for frame in bodies[0]])
+        if moving is None or often > _SOMETIMES:
+            return rest
+    return moving or "y"
+
+
+def _upright_along(bodies: FloatArray) -> str | None:
+    """The axis, y or z, to which vectors from feet to head (frames, 3) clearly point on average."""
+    length = np.linalg.norm(bodies, axis=1).mean()
+    mean = bodies.mean(axis=0)
+    for axis, other in ((1, 2), (2, 1)):
+        # Clearly: within about 45 degrees.
+        if mean[axis] > max(0.7 * length, 1.5 * abs(mean[other])):
+            return UPS[axis]
+    return None
 
 
 def _head_and_feet(
     names: Sequence[str], parents: npt.NDArray[np.int64]
 ) -> tuple[list[int], list[int]]:
-    """Joints of the head and of the feet: by name, else by how the skeleton branches.
+    """Joints of the head (or the trunk) and of the feet: by name, else by how it branches.
 
     By branching: legs are the chains without branches that start at the hips, and the joint where
     the rest branches next, the chest, stands in for the head.
     """
     head = [i for i, name in enumerate(names) if _HEAD.search(name)]
+    head = head or [i for i, name in enumerate(names) if _TRUNK.search(name)]
     feet = [i for i, name in enumerate(names) if _FEET.search(name)]
     if head and feet:
         return head, feet

@@ -1,0 +1,66 @@
+"""SIGINT ends the program in order, wherever it comes, and with an exit code of its own."""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+from types import FrameType
+
+INTERRUPTED = 130
+"""Exit code of an interrupted program, as shells have it: 128 and the number of the signal."""
+
+# An interruption that got lost is raised again after this time [s].
+_AGAIN_S = 0.05
+
+
+class Interrupted(KeyboardInterrupt):
+    """SIGINT came.
+
+    Not `KeyboardInterrupt` itself: the interpreter remembers one that has left any `exec`, such as
+    a dataclass's in the midst of an import, and in the end kills itself by the signal, though the
+    exception was caught.
+    """
+
+
+class Interruption:
+    """Watches for SIGINT.
+
+    Attributes:
+        came: Whether it came.
+    """
+
+    def __init__(self) -> None:
+        """Nothing has come yet."""
+        self.came = False
+        self._watching = False
+
+    def watch(self) -> None:
+        """Raise `Interrupted` in the main thread when SIGINT comes.
+
+        Where the signal is ignored or handled already, as under `nohup`, it stays so.
+        """
+        if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+            return
+        self._watching = True
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._lost
+        signal.signal(signal.SIGINT, self._handle)
+
+    def ignore(self) -> None:
+        """Let the program end undisturbed."""
+        if self._watching:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+        raise Interrupted
+
+    def _lost(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """What was raised where nothing can be: in a callback from C, or as an object goes."""
+        if unraisable.exc_type is not Interrupted:
+            self._hook(unraisable)
+            return
+        again = threading.Timer(_AGAIN_S, _thread.interrupt_main)
+        again.daemon = True
+        again.start()
