@@ -51,7 +51,7 @@ def place_ankles(
     targets = np.asarray(ankles, dtype=np.float64)
     for i, side in enumerate(FEET):
         thigh, shank, foot = (character.body(f"{side}_{x}") for x in ("thigh", "shank", "foot"))
-        turn_thigh, turn_shank = _leg_turns(
+        turn_thigh, turn_shank = bend_turns(
             states.positions[:, thigh],
             states.positions[:, shank],
             states.positions[:, foot],
@@ -67,10 +67,24 @@ def place_ankles(
     return out
 
 
-def _leg_turns(
+def bend_turns(
     hip: FloatArray, knee: FloatArray, ankle: FloatArray, lateral: FloatArray, target: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """World rotations (frames, 4) of thigh and shank with which the ankle meets its target."""
+    """How to turn two bones so that the end of the second comes to lie at a target.
+
+    Told for a leg; an arm is one whose lateral axis points the other way.
+
+    Args:
+        hip: (frames, 3) where the first bone begins [m].
+        knee: (frames, 3) where the second does.
+        ankle: (frames, 3) where that ends.
+        lateral: (frames, 3) axis about which the second bone flexes, in the world, unit length; a
+            limb that is straight or bent the wrong way bends about it.
+        target: (frames, 3) where the end is to be.
+
+    Returns:
+        World rotations (frames, 4) of the first and of the second bone.
+    """
     upper = np.linalg.norm(knee - hip, axis=1)
     lower = np.linalg.norm(ankle - knee, axis=1)
     along_thigh = (knee - hip) / upper[:, None]

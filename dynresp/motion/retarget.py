@@ -20,6 +20,7 @@ from dynresp.motion.floor import FloorConfig, find_floor, settle
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.readers.skeleton import SkeletonMotion
+from dynresp.motion.rest_pose import with_upright_rest
 from dynresp.motion.rotations import FloatArray
 from dynresp.motion.segments import Segments, find_segments
 
@@ -27,6 +28,20 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 _UP = np.array([0.0, 0.0, 1.0])
 # Sine of the least flexion (25 degrees) at which a limb shows the plane in which it bends.
 _BENT = 0.42
+# Joints of the character's own skeleton lie where its bodies do, within this [m].
+_SAME_PLACE = 0.002
+# A foot stands firmly under a straight leg if thigh and shank are within 35 degrees of the vertical
+# (the cosine), and its ankle is slower than this [m/s] and no higher than this [m] above where it
+# stands lowest; for at least so long [s].
+_STANDING_LEG = 0.82
+_STANDING_SPEED = 0.4
+_STANDING_RISE = 0.04
+_STANDING_S = 0.1
+# In three quarters of that time it is within 12 degrees of how it stands on average (the cosine);
+# else its tips are no matter of calibration.
+_STEADY = 0.978
+# A foot that stands tipped forward or backward by more than this [rad] is meant to: its heel is up.
+_HEEL_UP = np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -36,8 +51,8 @@ class RetargetConfig:
     Attributes:
         flat_floor: Whether the source stood on level ground; if not (stairs, terrain,
             playgrounds), where it mostly stands is put at height 0 and nothing else is moved.
-        rest_tilt_deg: A source whose trunk or thighs lean further than this in its rest pose does
-            not rest upright; it is then told from its straightest frame instead.
+        rest_tilt_deg: A source whose trunk or legs lean further than this in its rest pose does not
+            rest upright; its rest pose is then turned, or told from its straightest frames.
         floor: How it is set on the floor.
     """
 
@@ -67,7 +82,7 @@ def retarget(
     character = character or default_character()
     config = config or RetargetConfig()
     segments = find_segments(skeleton)
-    skeleton = _upright_rest(skeleton, segments, config.rest_tilt_deg)
+    skeleton = with_upright_rest(skeleton, segments, config.rest_tilt_deg)
     poses, ankles = _follow(skeleton, segments, character)
     poses = legs.place_ankles(character, poses, ankles)
     poses[:, 2] -= find_floor(character, poses, skeleton.fps, config.floor)
@@ -76,25 +91,6 @@ def retarget(
     states = character.kinematics(poses)
     contacts = foot_contacts(character, states, skeleton.fps)
     return Motion(poses, skeleton.fps, skeleton.name, contacts)
-
-
-def _upright_rest(skeleton: SkeletonMotion, segments: Segments, tilt_deg: float) -> SkeletonMotion:
-    """The same motion, told from an upright pose if its own rest pose is none."""
-
-    def tilts(points: FloatArray) -> FloatArray:
-        """Angles [rad] of trunk, thighs and shanks from the vertical, (frames, 5)."""
-        bones = [points[:, segments.chest] - points[:, segments.pelvis]]
-        for limb in segments.limbs.values():
-            bones += [points[:, limb["hip"]] - points[:, limb["knee"]]]
-            bones += [points[:, limb["knee"]] - points[:, limb["ankle"]]]
-        stacked = np.stack(bones, axis=1)
-        across = np.linalg.norm(stacked[..., :2], axis=-1)
-        return np.arctan2(across, stacked[..., 2])
-
-    if np.degrees(tilts(skeleton.rest_positions()[None])).max() <= tilt_deg:
-        return skeleton
-    straightest = int(np.argmin(tilts(skeleton.joint_positions()).sum(axis=1)))
-    return skeleton.with_rest(skeleton.rotations[straightest])
 
 
 def _follow(
@@ -135,16 +131,29 @@ def _follow(
         toe_out = np.arctan2(toes[1], toes[0]) if np.hypot(toes[0], toes[1]) > 0.01 else 0.0
         follow(f"{side}_foot", limb["ankle"], rotations.from_yaw(np.clip(toe_out, -0.6, 0.6)))
 
-    _straighten_hinges(world, character)
-
     points = skeleton.joint_positions()
     scale = _leg_length(character) / _source_leg_length(rest, segments)
+    ankles = scale * np.stack([points[:, segments.limbs[x]["ankle"]] for x in FEET], axis=1)
+    if not _is_ours(skeleton, rest, forward, character):
+        _straighten_hinges(world, character)
+        _level_feet(world, character, ankles, skeleton.fps)
     poses = np.empty((skeleton.frames, 59))
     hips = [points[:, segments.limbs[side]["hip"]] for side in FEET]
     poses[:, ROOT] = scale * np.mean(hips, axis=0)
     poses[:, 3:] = character.local_rotations(world).reshape(skeleton.frames, -1)
-    ankles = np.stack([points[:, segments.limbs[side]["ankle"]] for side in FEET], axis=1)
-    return poses, scale * ankles
+    return poses, ankles
+
+
+def _is_ours(
+    skeleton: SkeletonMotion, rest: FloatArray, forward: FloatArray, character: Character
+) -> bool:
+    """Whether this is the character itself, as it is exported: then nothing is to be calibrated."""
+    if not set(character.body_names) <= set(skeleton.names):
+        return False
+    joints = [skeleton.names.index(name) for name in character.body_names]
+    found = rotations.rotate(rotations.conjugate(forward), rest[joints] - rest[joints[0]])
+    own = character.kinematics(character.rest_pose).positions[0]
+    return bool(np.abs(found - (own - own[0])).max() < _SAME_PLACE)
 
 
 def _straighten_hinges(world: FloatArray, character: Character) -> None:
@@ -178,6 +187,47 @@ def _straighten_hinges(world: FloatArray, character: Character) -> None:
             world[:, below] = rotations.multiply(world[:, below], untwist)
 
 
+def _level_feet(world: FloatArray, character: Character, ankles: FloatArray, fps: float) -> None:
+    """Turn the feet so that they are level, on average, while they stand under a straight leg.
+
+    How the sole lies under the ankle is not in the sources, and their feet rest tipped by 20
+    degrees and more (sideways, where the legs rest apart). One constant turn sets each foot right.
+
+    Args:
+        world: (frames, 14, 4) orientations of the bodies; changed in place.
+        character: The character.
+        ankles: (frames, 2, 3) [m].
+        fps: Frame rate [1/s].
+    """
+    for i, side in enumerate(FEET):
+        foot = character.body(f"{side}_foot")
+        upright = np.ones(len(world), dtype=bool)
+        for part in ("thigh", "shank"):
+            leg = rotations.rotate(world[:, character.body(f"{side}_{part}")], _UP)
+            upright &= leg[:, 2] > _STANDING_LEG
+        height = ankles[:, i, 2]
+        if not upright.any():
+            continue
+        low = height < np.quantile(height[upright], 0.1) + _STANDING_RISE
+        standing = upright & low & (_speeds(ankles[:, i], fps) < _STANDING_SPEED)
+        if np.count_nonzero(standing) < _STANDING_S * fps:
+            continue
+        ups = rotations.rotate(rotations.conjugate(world[standing, foot]), _UP)
+        up = ups.sum(axis=0)
+        if np.quantile(ups @ up / np.linalg.norm(up), 0.25) < _STEADY:
+            continue
+        if abs(np.arctan2(up[0], up[2])) > _HEEL_UP:
+            up[0] = 0.0
+        world[:, foot] = rotations.multiply(world[:, foot], rotations.between_vectors(_UP, up))
+
+
+def _speeds(points: FloatArray, fps: float) -> FloatArray:
+    """Speeds [m/s] of a point (frames, 3); of a single frame zero."""
+    if len(points) < 2:
+        return np.zeros(len(points))
+    return np.asarray(np.linalg.norm(np.gradient(points, 1.0 / fps, axis=0), axis=1))
+
+
 def _leg_length(character: Character) -> float:
     """Hip to knee to ankle [m]."""
     bodies = [character.body("left_shank"), character.body("left_foot")]
@@ -204,12 +254,12 @@ def t_pose_frames(character: Character, motion: Motion) -> npt.NDArray[np.bool_]
         sign = 1.0 if side == "left" else -1.0
         chest = states.quaternions[:, character.body("chest")]
         outward = rotations.rotate(chest, np.array([0.0, sign, 0.0]))
-        for part, limit in (("upper_arm", 25.0), ("forearm", 30.0)):
+        for part, limit in (("upper_arm", 36.0), ("forearm", 36.0)):
             bone = rotations.rotate(states.quaternions[:, character.body(f"{side}_{part}")], _DOWN)
             cosine = np.clip(np.sum(bone * outward, axis=-1), -1.0, 1.0)
             down &= np.degrees(np.arccos(cosine)) < limit
         thigh = rotations.rotate(states.quaternions[:, character.body(f"{side}_thigh")], _UP)
-        down &= thigh[:, 2] > np.cos(np.radians(20.0))
+        down &= thigh[:, 2] > np.cos(np.radians(25.0))
     return down
 
 

@@ -1,33 +1,26 @@
 """Which joint of somebody else's skeleton moves which body of the character.
 
-Names first, since nearly every source uses one of a few naming customs; the tree then settles
-trunk and head, whose number of joints differs from source to source.
+Names first, since nearly every source uses one of a few naming customs, and the skeleton's build
+where they say nothing. The tree then settles trunk, head and toes, whose number of joints differs
+from source to source.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import MotionError
+from dynresp.motion.joint_names import LIMB_JOINTS, head_joint, limb_joints, words_of
+from dynresp.motion.joint_tree import children_of, find_limbs, longest_branch, reaches
 from dynresp.motion.motion import FEET
 from dynresp.motion.readers.skeleton import SkeletonMotion
 
-# For each limb's joints, the names in use without their side, the surer first. "shoulder" is the
-# upper arm in some sources and the collar bone in others, which then also have an "arm".
-_LIMB_NAMES = {
-    "hip": ("femur", "upleg", "upperleg", "thigh", "hip"),
-    "knee": ("tibia", "shin", "calf", "shank", "lowerleg", "lowleg", "knee", "leg"),
-    "ankle": ("ankle", "foot"),
-    "shoulder": ("humerus", "upperarm", "uparm", "arm", "shoulder"),
-    "elbow": ("radius", "forearm", "lowerarm", "lowarm", "elbow"),
-    "wrist": ("wrist", "hand"),
-}
 _CHAINS = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
-_HEAD_NAMES = ("head", "skull", "neck1", "neck")
+# Bones shorter than this [m] have no direction worth the name.
+_SHORTEST_BONE = 0.02
 # The part of the way from the hips to the base of the head that the character's abdomen covers
 # ends at 62 % and begins at 25 % (models/ragdoll.xml); its middle tells the joint that moves it.
 _ABDOMEN_MIDDLE = 0.43
@@ -41,10 +34,10 @@ class Segments:
         pelvis: The joint from which both legs branch off.
         abdomen: The joint that moves the middle of the trunk, or None where the trunk has no
             joint there.
-        chest: The joint from which both arms branch off.
+        chest: The joint from which both arms branch off, or the one below it if that is the neck.
         head: The joint that moves the head.
         limbs: For "left" and "right", the joints "hip", "knee", "ankle", "toe", "shoulder",
-            "elbow" and "wrist".
+            "elbow" and "wrist"; "toe" is the ankle itself where nothing follows it.
     """
 
     pelvis: int
@@ -60,44 +53,63 @@ def find_segments(skeleton: SkeletonMotion) -> Segments:
     Raises:
         MotionError: Some joint is not there; the message names the joints that are.
     """
-    plain = {_plain(name): i for i, name in reversed(list(enumerate(skeleton.names)))}
-    limbs: dict[str, dict[str, int]] = {}
-    for side in FEET:
-        limbs[side] = {}
-        for joint, names in _LIMB_NAMES.items():
-            found = next((plain[s] for n in names for s in _sided(side, n) if s in plain), None)
-            if found is None and joint == "wrist":
-                found = _first_child(skeleton, limbs[side]["elbow"])
-            if found is None:
-                raise MotionError(
-                    f"{skeleton.name!r}: no joint found for the {side} {joint}; looked for "
-                    f"{', '.join(names)} with a side, among: {', '.join(skeleton.names)}"
-                )
-            limbs[side][joint] = found
-        toe = _first_child(skeleton, limbs[side]["ankle"])
-        limbs[side]["toe"] = limbs[side]["ankle"] if toe is None else toe
-        _check_chain(skeleton, side, limbs[side])
+    try:
+        limbs = _by_name(skeleton)
+    except MotionError:
+        found = find_limbs(skeleton)
+        if found is None:
+            raise
+        limbs = _by_side(found)
+    for limb in limbs.values():
+        limb["toe"] = _toe(skeleton, limb["ankle"])
     pelvis = _common_ancestor(skeleton, limbs["left"]["hip"], limbs["right"]["hip"])
-    chest = _common_ancestor(skeleton, limbs["left"]["shoulder"], limbs["right"]["shoulder"])
-    head = next((plain[n] for n in _HEAD_NAMES if n in plain), chest)
+    fork = _common_ancestor(skeleton, limbs["left"]["shoulder"], limbs["right"]["shoulder"])
+    chest = fork
+    if "neck" in words_of(skeleton.names[fork]) and skeleton.parents[fork] >= 0:
+        # Collar bones that hang from the neck do not turn with it in a person.
+        chest = int(skeleton.parents[fork])
+    head = head_joint(skeleton.names)
+    if head is None:
+        head = _top(skeleton, fork, [limb["shoulder"] for limb in limbs.values()])
     return Segments(pelvis, _abdomen(skeleton, pelvis, chest, head), chest, head, limbs)
 
 
-def _plain(name: str) -> str:
-    """A name without prefix ("mixamorig:"), case, blanks and marks."""
-    return re.sub(r"[^a-z0-9]", "", re.split(r"[:|]", name.lower())[-1])
+def _by_name(skeleton: SkeletonMotion) -> dict[str, dict[str, int]]:
+    """The limbs' joints by their names.
+
+    Raises:
+        MotionError: A joint is missing, or does not hang where it should.
+    """
+    found = limb_joints(skeleton.names)
+    children = children_of(skeleton.parents)
+    for side in FEET:
+        elbow = found.get((side, "elbow"))
+        if elbow is not None and (side, "wrist") not in found and children[elbow]:
+            found[side, "wrist"] = children[elbow][0]
+        for joint, words in LIMB_JOINTS.items():
+            if (side, joint) not in found:
+                raise MotionError(
+                    f"{skeleton.name!r}: no joint found for the {side} {joint}; looked for "
+                    f"{', '.join(words)} with a side, and for limbs by their build, among: "
+                    f"{', '.join(skeleton.names)}"
+                )
+    limbs = _by_side(found)
+    for side, limb in limbs.items():
+        _check_chain(skeleton, side, limb)
+    return limbs
 
 
-def _sided(side: str, name: str) -> list[str]:
-    letter = side[0]
-    ends = (side, letter)
-    return [f"{end}{name}" for end in ends] + [f"{name}{end}" for end in ends] + [
-        f"bip01{letter}{name}", f"{letter}{name}1"]  # fmt: skip
+def _by_side(found: dict[tuple[str, str], int]) -> dict[str, dict[str, int]]:
+    return {side: {joint: found[side, joint] for joint in LIMB_JOINTS} for side in FEET}
 
 
-def _first_child(skeleton: SkeletonMotion, joint: int) -> int | None:
-    children = np.flatnonzero(skeleton.parents == joint)
-    return int(children[0]) if len(children) else None
+def _toe(skeleton: SkeletonMotion, ankle: int) -> int:
+    """Where the foot points: the joint called toe, else the end that is farthest."""
+    children = children_of(skeleton.parents)[ankle]
+    named = [c for c in children if {"toe", "toes", "ball"} & set(words_of(skeleton.names[c]))]
+    return max(
+        named or children, key=lambda c: float(np.linalg.norm(skeleton.offsets[c])), default=ankle
+    )
 
 
 def _ancestors(parents: npt.NDArray[np.int64], joint: int) -> list[int]:
@@ -114,13 +126,33 @@ def _common_ancestor(skeleton: SkeletonMotion, a: int, b: int) -> int:
 
 
 def _check_chain(skeleton: SkeletonMotion, side: str, limb: dict[str, int]) -> None:
+    rest = skeleton.rest_positions()
     for upper, lower in _CHAINS:
-        if limb[upper] not in _ancestors(skeleton.parents, limb[lower])[1:]:
+        a, b = limb[upper], limb[lower]
+        if a not in _ancestors(skeleton.parents, b)[1:]:
             raise MotionError(
-                f"{skeleton.name!r}: took {skeleton.names[limb[upper]]!r} for the {side} {upper} "
-                f"and {skeleton.names[limb[lower]]!r} for the {lower}, but the second does not "
-                "hang from the first"
+                f"{skeleton.name!r}: took {skeleton.names[a]!r} for the {side} {upper} and "
+                f"{skeleton.names[b]!r} for the {lower}, but the second does not hang from the "
+                "first"
             )
+        length = float(np.linalg.norm(rest[b] - rest[a]))
+        if length < _SHORTEST_BONE:
+            raise MotionError(
+                f"{skeleton.name!r}: the bone from {skeleton.names[a]!r} to {skeleton.names[b]!r} "
+                f"is {length:.3f} m long, too short for the {side} {upper} to {lower} of a person"
+            )
+
+
+def _top(skeleton: SkeletonMotion, fork: int, shoulders: list[int]) -> int:
+    """The last joint above the shoulders that something follows; the fork itself if none does."""
+    children = children_of(skeleton.parents)
+    reach = reaches(skeleton.parents, skeleton.offsets)
+    arms = {joint for shoulder in shoulders for joint in _ancestors(skeleton.parents, shoulder)}
+    rest = [child for child in children[fork] if child not in arms]
+    if not rest:
+        return fork
+    chain = longest_branch(children, reach, max(rest, key=lambda child: float(reach[child])))
+    return chain[-2] if len(chain) > 1 else chain[-1]
 
 
 def _abdomen(skeleton: SkeletonMotion, pelvis: int, chest: int, head: int) -> int | None:
