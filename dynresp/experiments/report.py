@@ -17,7 +17,9 @@ from dynresp.experiments.hits import Hit
 from dynresp.experiments.result import describe, outcome, write_json
 from dynresp.experiments.showing import show
 from dynresp.experiments.spec import Artefact, OutputTable
+from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
+from dynresp.physics.impacts import Strike
 from dynresp.response.quality import Quality
 from dynresp.response.response import CARRY_ON, Response
 
@@ -147,7 +149,7 @@ def _subtitle(hit: Hit, response: Response) -> str:
     if asked["kind"] == "push":
         what = f"push of {asked['force_n']:.0f} N over {asked['duration_s']:.2g} s"
     elif asked["kind"] == "strike":
-        what = "recorded strike"
+        what = "strike"
     else:
         what = f"{asked['kind']} of {asked['mass_kg']:.2g} kg at {asked['speed_m_s']:.3g} m/s"
     what += f" from {side_of(asked['from_deg'])}"
@@ -156,7 +158,18 @@ def _subtitle(hit: Hit, response: Response) -> str:
     if response.contact is None or response.choice is None:
         return f"{what}: missed"
     body = response.contact.body.replace("_", " ")
-    return f"{what}, hits the {body}: {spoken(response.choice)}"
+    made = " (built-in motions)" if _has_built_in(hit, response) else ""
+    return f"{what}, hits the {body}: {spoken(response.choice)}{made}"
+
+
+def _has_built_in(hit: Hit, response: Response) -> bool:
+    """Whether any motion shown was made by this project, and is no motion capture."""
+    names = [response.motion.name]
+    if response.entered is not None:
+        names.append(response.entered.name)
+    if isinstance(hit.impact, Strike):
+        names.append(hit.impact.motion.name)
+    return any(name.startswith(PREFIX) for name in names)
 
 
 def spoken(choice: str) -> str:
