@@ -6,6 +6,7 @@ the commands, so that help comes at once.
 
 from __future__ import annotations
 
+import os
 import sys
 
 from dynresp.cli.interruption import INTERRUPTED, Interruption
@@ -32,6 +33,11 @@ def main() -> None:
 
 
 def _run() -> None:
+    # MuJoCo reads this on import, and fails where the renderer that it names is not there. Only
+    # the video is rendered, in a process of its own, which is told by another name.
+    renderer = os.environ.pop("MUJOCO_GL", None)
+    if renderer is not None:
+        os.environ.setdefault("DYNRESP_GL", renderer)
     # Imported here, where an interruption is caught.
     from dynresp.cli.app import app
 

@@ -32,6 +32,8 @@ from dynresp.view.story import Story
 from dynresp.view.video_worker import PROGRESS
 
 GL_VARIABLE = "MUJOCO_GL"
+# What the user asked for where that was taken out of MuJoCo's sight (dynresp/cli/__init__.py).
+ASKED_VARIABLE = "DYNRESP_GL"
 """Environment variable by which a user tells MuJoCo how to draw; it is tried first."""
 
 # A worker that says nothing for so long [s] hangs in a graphics driver.
@@ -147,7 +149,7 @@ def _no_space(error: OSError) -> DynrespError:
 def _ways() -> list[str]:
     """Values of MUJOCO_GL to try, what the user asked for first; "" leaves it to MuJoCo."""
     usual = ["egl", "osmesa"] if sys.platform.startswith("linux") else [""]
-    told = os.environ.get(GL_VARIABLE, "")
+    told = os.environ.get(ASKED_VARIABLE) or os.environ.get(GL_VARIABLE, "")
     return [told, *(way for way in usual if way != told)] if told else usual
 
 

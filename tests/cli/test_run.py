@@ -199,3 +199,18 @@ def test_the_demo_needs_no_network_and_little_time(tmp_path: Path) -> None:
     assert content["library"]["built_in"]
     assert content["happened"]["outcome"] == "reaction"
     assert "built-in motions stand in" in done.stderr
+
+
+def test_a_renderer_that_is_not_there_costs_no_more_than_the_video(world: Path) -> None:
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "dynresp", "run", str(world / "experiment.toml")),
+            *("--out", str(world / "out"), "--motions", str(world)),
+        ],
+        env=dict(os.environ, MUJOCO_GL="bogus"),
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert (world / "out" / "result.json").is_file()
