@@ -205,7 +205,7 @@ def test_a_renderer_that_is_not_there_costs_no_more_than_the_video(world: Path) 
     done = subprocess.run(
         [
             *(sys.executable, "-m", "dynresp", "run", str(world / "experiment.toml")),
-            *("--out", str(world / "out"), "--motions", str(world)),
+            *("--out", str(world / "out"), "--motions", str(world / "motions")),
         ],
         env=dict(os.environ, MUJOCO_GL="bogus"),
         capture_output=True,
