@@ -64,7 +64,6 @@ class ServoConfig:
     stiffness_floors: Mapping[str, float] = field(default_factory=_stiffness_floors)
     torque_limits: Mapping[str, float] = field(default_factory=_torque_limits)
 
-
     def __post_init__(self) -> None:
         """Check the numbers.
 
