@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -79,11 +80,18 @@ def answer(
 
 
 def _check_folder(out: Path) -> None:
-    """Refuse, before any work, to write where there is a file."""
+    """Refuse, before any work, to write where nothing can be written."""
     from dynresp.errors import UsageError
 
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out: {str(out)!r} is a file; expected a folder for the results")
+    # The nearest folder that is there: the rest is made when there is something to write.
+    above = next(folder for folder in [out, *out.absolute().parents] if folder.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise UsageError(
+            f"--out: {str(out)!r} cannot be written, because of {str(above)!r}; choose another "
+            "folder"
+        )
 
 
 def _all_diverged(content: dict[str, Any]) -> bool:

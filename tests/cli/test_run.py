@@ -214,3 +214,14 @@ def test_a_renderer_that_is_not_there_costs_no_more_than_the_video(world: Path) 
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert (world / "out" / "result.json").is_file()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
+    world: Path, dynresp: Command
+) -> None:
+    (world / "FILE").write_text("")
+    out = world / "FILE" / "sub"
+    result = dynresp("run", world / "experiment.toml", "--out", out, "--motions", world / "motions")
+    assert result.exit_code == 2
+    assert "--out" in result.stderr
+    assert "simulating" not in result.stderr
