@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 
 from dynresp.errors import UnknownNameError
-from dynresp.experiments.values import Name, Number, fixed, is_random, name, number, shown, whole
+from dynresp.experiments.values import Name, Number, fixed, name, number, shown, whole
 
 MAX_COUNT = 100_000
 """Most hits of one experiment."""
@@ -132,11 +132,6 @@ class ImpactTable(Strict):
     kind: str
     time_s: Time
     from_deg: Bearing = 0.0
-
-    @property
-    def random_keys(self) -> tuple[str, ...]:
-        """Keys whose values are drawn anew for each hit."""
-        return tuple(key for key in type(self).model_fields if is_random(getattr(self, key)))
 
 
 class BallTable(ImpactTable):

@@ -46,7 +46,7 @@ _HEEL_UP = np.radians(10.0)
 
 @dataclass(frozen=True)
 class RetargetConfig:
-    """How the feet and the body are set on the floor.
+    """How a source is laid onto the character.
 
     Attributes:
         flat_floor: Whether the source stood on level ground; if not (stairs, terrain,
@@ -249,7 +249,7 @@ def t_pose_frames(character: Character, motion: Motion) -> npt.NDArray[np.bool_]
     Sources begin and end with such a pose to calibrate; it is no motion of anybody.
     """
     states = character.kinematics(motion.poses)
-    down = np.ones(len(motion), dtype=bool)
+    held = np.ones(len(motion), dtype=bool)
     for side in FEET:
         sign = 1.0 if side == "left" else -1.0
         chest = states.quaternions[:, character.body("chest")]
@@ -257,10 +257,10 @@ def t_pose_frames(character: Character, motion: Motion) -> npt.NDArray[np.bool_]
         for part, limit in (("upper_arm", 36.0), ("forearm", 36.0)):
             bone = rotations.rotate(states.quaternions[:, character.body(f"{side}_{part}")], _DOWN)
             cosine = np.clip(np.sum(bone * outward, axis=-1), -1.0, 1.0)
-            down &= np.degrees(np.arccos(cosine)) < limit
+            held &= np.degrees(np.arccos(cosine)) < limit
         thigh = rotations.rotate(states.quaternions[:, character.body(f"{side}_thigh")], _UP)
-        down &= thigh[:, 2] > np.cos(np.radians(25.0))
-    return down
+        held &= thigh[:, 2] > np.cos(np.radians(25.0))
+    return held
 
 
 def trim_t_poses(character: Character, motion: Motion, lead_s: float = 0.4) -> Motion:

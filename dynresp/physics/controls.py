@@ -51,6 +51,8 @@ class Controls:
         self._size = start
         self._servos, self._wrenches, self._welds, self._places, self._turns = columns
         self.hold = self._welds.start + scene.hold_weld
+        self._hold_target = self._target(scene.hold_mocap)
+        self._strike_target = self._target(scene.strike_mocap or 0)
         self._steps = np.arange(self._substeps) / self._substeps
         # Every simulation is at a whole frame, so these are the same for all.
         lead = servo_gains(scene.character, scene.config.servo).lead_s * self._fps
@@ -58,6 +60,11 @@ class Controls:
         self._hold_at = self._steps + HOLD_LEAD_S * self._fps
         latest = max(self._joints_at.max(), self._hold_at.max())
         self.read_ahead = int(np.floor(latest)) + 2
+
+    def _target(self, mocap: int) -> tuple[slice, slice]:
+        """Columns of a mocap body's position and orientation."""
+        place, turn = self._places.start + 3 * mocap, self._turns.start + 4 * mocap
+        return slice(place, place + 3), slice(turn, turn + 4)
 
     def pack(
         self,
@@ -93,11 +100,9 @@ class Controls:
         controls[..., self._servos] = between(joints, self._joints_at).reshape(
             len(near), self._substeps, -1
         )
-        place, turn = self._places.start, self._turns.start
-        controls[..., place : place + 3] = between(near[..., ROOT], self._hold_at)
-        controls[..., turn : turn + 4] = rotations.normalize(
-            between(near[..., ROOT_QUAT], self._hold_at)
-        )
+        place, turn = self._hold_target
+        controls[..., place] = between(near[..., ROOT], self._hold_at)
+        controls[..., turn] = rotations.normalize(between(near[..., ROOT_QUAT], self._hold_at))
         for row, impact, frame in zip(controls, impacts, frames, strict=True):
             self._hit(row, impact, frame + self._steps)
         return controls
@@ -111,9 +116,9 @@ class Controls:
         if impact.strike_poses is not None:
             drawn = at + STRIKE_LEAD_S * self._fps
             pose = between(impact.strike_poses[None], drawn)[0]
-            row[:, self._places.start + 3 : self._places.start + 6] = pose[:, :3]
-            turn = rotations.normalize(pose[:, 3:])
-            row[:, self._turns.start + 4 : self._turns.start + 8] = turn
+            place, turn = self._strike_target
+            row[:, place] = pose[:, :3]
+            row[:, turn] = rotations.normalize(pose[:, 3:])
 
 
 def between(rows: FloatArray, at: FloatArray) -> FloatArray:

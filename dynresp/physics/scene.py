@@ -83,6 +83,7 @@ class Scene:
         kind: What it holds beside the character.
         config: How it runs.
         hold_mocap: Index of the mocap body to which the pelvis is held.
+        strike_mocap: Index of the one that draws a striking arm; None without one.
         hold_weld: Index of the equality that holds it.
         contact_bodies: Names of the character's bodies in the order of the contact sensors.
     """
@@ -95,6 +96,8 @@ class Scene:
         self.contact_bodies = character.body_names
         self.model = self._compose().compile()
         self.hold_mocap = int(self.model.body("hold").mocapid[0])
+        strikes = kind is ImpactorKind.STRIKER
+        self.strike_mocap = int(self.model.body("strike").mocapid[0]) if strikes else None
         self.hold_weld = self.model.equality("hold").id
 
     def _compose(self) -> mujoco.MjSpec:

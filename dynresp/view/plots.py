@@ -107,36 +107,6 @@ def write_alignment(
         figure.savefig(temporary, format="png")
 
 
-def write_ranking(
-    path: Path | str,
-    ranking: Sequence[RankedReaction],
-    chosen_name: str,
-    title: str = "",
-    *,
-    unit: str = "",
-) -> None:
-    """Write how the reactions compare, the best first, as a PNG of bars.
-
-    Args:
-        path: The file; missing folders are made.
-        ranking: The best window error of each reaction, in any order.
-        chosen_name: The one that was chosen.
-        title: First line.
-        unit: Unit of the error; none where it is empty.
-
-    Raises:
-        MotionError: No reaction, or none with a finite error.
-        DynrespError: The file cannot be written.
-    """
-    shown = sum(np.isfinite(reaction.error) for reaction in ranking)
-    figure = _figure(6.4, 1.2 + 0.21 * min(max(shown, 1), _MOST_BARS))
-    label = "best window error" + (f" [{unit}]" if unit else "")
-    _bars(figure.add_subplot(), ranking, chosen_name, label)
-    _heading(figure, title)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format="png")
-
-
 def _heading(figure: Figure, title: str) -> None:
     # A dollar sign in a title is one: nothing here is mathematics.
     figure.suptitle(title, x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK,

@@ -63,7 +63,6 @@ def test_a_whole_file_is_understood() -> None:
     assert impact.time_s == Uniform(1.0, 2.0)
     assert impact.target == Choice(("head", "chest"))
     assert impact.from_deg == 0.0
-    assert impact.random_keys == ("time_s", "target")
     assert experiment.base.start_s == 1.0
     assert experiment.settings.blend_s == 0.4
     assert experiment.output.write == ("motion.npz",)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dynresp.errors import MotionError
-from dynresp.view.plots import RankedReaction, write_alignment, write_ranking
+from dynresp.view.plots import RankedReaction, write_alignment
 
 EXITS, ENTRIES = np.arange(6) / 30, np.arange(20) / 30
 RANKING = [RankedReaction("step", 1.0), RankedReaction("roll", 3.0), RankedReaction("no", np.inf)]
@@ -50,13 +50,14 @@ def test_surfaces_that_cannot_be_shown(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_ranking(tmp_path: Path) -> None:
-    write_ranking(tmp_path / "a.png", RANKING, "roll", "a title")
+def test_a_ranking_of_many_and_of_none(tmp_path: Path) -> None:
     many = [RankedReaction(f"reaction {k}", k + 1.0) for k in range(60)]
-    write_ranking(tmp_path / "b.png", many, "reaction 50")
+    place = (bowl(), EXITS, ENTRIES, 0.1, 0.3)
+    write_alignment(tmp_path / "a.png", *place, ranking=many, chosen_name="reaction 50")
+    none = [RankedReaction("no", np.inf)]
     with pytest.raises(MotionError, match="no reaction"):
-        write_ranking(tmp_path / "c.png", [RankedReaction("no", np.inf)], "no")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+        write_alignment(tmp_path / "b.png", *place, ranking=none, chosen_name="no")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
 
 
 @pytest.mark.parametrize("text", ["price $\\foo{$ up", "one $ and $ two"])
@@ -78,7 +79,6 @@ def test_dollar_signs_are_no_mathematics(
         tmp_path / "a.png", bowl(), EXITS, ENTRIES, 0.1, 0.3, text, unit=text, ranking=ranking,
         chosen_name=text,
     )  # fmt: skip
-    write_ranking(tmp_path / "b.png", ranking, text, text, unit=text)
     for figure in drawn:
         assert not [t for t in figure.findobj(has_mathematics) if text in t.get_text()]
 

@@ -114,12 +114,6 @@ def planted(
     return ankles, foot
 
 
-def smoother_step(t: npt.ArrayLike) -> FloatArray:
-    """0 to 1 with no slope and no curvature at the ends: 6 t^5 - 15 t^4 + 10 t^3."""
-    t = np.clip(np.asarray(t, dtype=np.float64), 0.0, 1.0)
-    return t**3 * (t * (6.0 * t - 15.0) + 10.0)
-
-
 def stance_track(
     stances: Sequence[Stance], sole: Sole, times: FloatArray, outward: float
 ) -> FootTrack:
@@ -186,7 +180,7 @@ def _step(
     """The foot in the air: off the ball where it stood, onto the heel where it comes to stand."""
     before, after = stances
     u = (times - before.stop) / (after.start - before.stop)
-    share = smoother_step(u)
+    share = rotations.ease(u)
     turn = turns[0] + share * (turns[1] - turns[0])
     leaving, foot = planted(sole, before.at, turn, pitch, "ball")
     coming, _ = planted(sole, after.at, turn, pitch, "heel")
