@@ -3,50 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from dynresp.errors import MotionError
-from dynresp.motion.character import BodyStates, Character
+from dynresp.motion.character import Character
 from dynresp.motion.floor import raise_above
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.library import ReactionLibrary
-from dynresp.motion.motion import Motion, pose_velocities
+from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import Impact, PreparedImpact, prepare
-from dynresp.physics.scene import ImpactorKind, Scene
+from dynresp.physics.impacts import Impact, PreparedImpact
 from dynresp.physics.simulation import Simulation
-from dynresp.physics.trace import Setup, Trace
-from dynresp.response.oracle import OracleResult, search
-from dynresp.response.response import CARRY_ON, GRAZE_S, Response, ResponseConfig
+from dynresp.physics.trace import Trace
+from dynresp.response.choice import Choice
+from dynresp.response.hits import HitBatch, HitStage
+from dynresp.response.look_ahead import LookAhead, look_ahead_of
+from dynresp.response.oracle_choice import OracleChooser
+from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.transition import (
     blend_onto,
     blended_targets,
     place_on,
 )
-from dynresp.response.windows import (
-    LibraryWindows,
-    ReactionTrack,
-    library_windows,
-    make_windows,
-    trace_windows,
-)
 
 
-@dataclass(frozen=True)
-class _Choice:
-    """What was decided for one simulation; frames of the trace but for the entry."""
+class Chooser(Protocol):
+    """What decides how hits go on."""
 
-    name: str
-    motion: Motion
-    exit: int
-    entry: int
-    error: float
-    oracle: OracleResult
-    carry_on: OracleResult
-    graze: bool
-    speed_change: float
+    def choose(self, hits: LookAhead) -> list[Choice]:
+        """Choose for each hit."""
 
 
 class Responder:
@@ -58,14 +46,16 @@ class Responder:
         library: ReactionLibrary,
         config: ResponseConfig | None = None,
         threads: int = 0,
+        chooser: Chooser | None = None,
     ) -> None:
-        """Cut the library's windows once.
+        """Make ready.
 
         Args:
             character: The character.
             library: Its reactions, at the simulation's frame rate.
             config: Settings.
             threads: Threads for the physics, 0 for all cores.
+            chooser: What chooses; None for the oracle.
 
         Raises:
             MotionError: Library and simulation differ in their frame rate.
@@ -73,19 +63,11 @@ class Responder:
         self.character = character
         self.library = library
         self.config = config or ResponseConfig()
-        self.threads = threads
         fps = self.config.physics.fps
         if self.config.window.fps != fps or any(r.motion.fps != fps for r in library.reactions):
             raise MotionError(f"simulation, search and library must all run at {fps:g} fps")
-        left = round(max(self.config.remaining_s, self.config.transition.blend_s + 2 / fps) * fps)
-        left = max(left, self.config.window.window_frames - 1)
-        latest = round(self.config.entry_max_s * fps) + 1
-        tracks = [
-            self._track(r.name, r.motion.poses, (0, max(1, min(latest, len(r.motion) - left))))
-            for r in library.reactions
-        ]
-        self.windows: LibraryWindows = library_windows(tracks, self.config.window)
-        self._scenes: dict[ImpactorKind, Scene] = {}
+        self.chooser = chooser or OracleChooser(character, library, self.config)
+        self._stage = HitStage(character, self.config, threads)
 
     def respond(
         self,
@@ -105,124 +87,45 @@ class Responder:
             SpecError: An impact lies outside its base motion.
             MotionError: A base motion has another frame rate.
         """
-        for base, _ in hits:
-            if base.fps != self.config.physics.fps:
-                raise MotionError(
-                    f"base motion {base.name!r} has {base.fps:g} fps, but the simulation runs at "
-                    f"{self.config.physics.fps:g}; resample it"
-                )
         tell = progress or (lambda stage, done, of: None)
-        prepared = [
-            prepare(impact, base, self.character, self.config.physics) for base, impact in hits
-        ]
-        responses: list[Response | None] = [None] * len(hits)
-        for kind in ImpactorKind:
-            rows = [i for i, p in enumerate(prepared) if p.kind is kind]
-            if rows:
-                bases = [hits[i][0] for i in rows]
-                done = self._respond_alike(kind, bases, [prepared[i] for i in rows], tell)
-                for i, response in zip(rows, done, strict=True):
-                    responses[i] = response
-        return [response for response in responses if response is not None]
+        responses: dict[int, Response] = {}
+        for batch in self._stage.batches(hits):
+            responses.update(zip(batch.rows, self._respond_alike(batch, tell), strict=True))
+        return [responses[row] for row in range(len(hits))]
 
     # -- steps of the way -----------------------------------------------------------------------
 
     def _respond_alike(
-        self,
-        kind: ImpactorKind,
-        bases: list[Motion],
-        prepared: list[PreparedImpact],
-        tell: Callable[[str, int, int], None],
+        self, batch: HitBatch, tell: Callable[[str, int, int], None]
     ) -> list[Response]:
         """Answer hits that all need the same scene."""
-        if kind not in self._scenes:
-            self._scenes[kind] = Scene(self.character, kind, self.config.physics)
-        setups = [
-            Setup(base.poses[p.start :], p, velocity=_velocity(base, p.start))
-            for base, p in zip(bases, prepared, strict=True)
-        ]
-        tell("simulating", 0, len(setups))
-        simulation = Simulation(self._scenes[kind], setups, self.threads)
-        traces = simulation.look_ahead(self.config.horizon_s)
-        tell("simulating", len(setups), len(setups))
-        choices: list[_Choice | None] = []
-        for i, (base, setup, trace) in enumerate(zip(bases, setups, traces, strict=True)):
-            tell("choosing", i, len(setups))
-            hit = trace.contact is not None and trace.diverged is None
-            choices.append(self._choose(base, setup.impact, trace) if hit else None)
-        tell("choosing", len(setups), len(setups))
-        final = self._finish(simulation, choices)
-        return [
-            self._compose(*row) for row in zip(bases, prepared, traces, choices, final, strict=True)
-        ]
-
-    def _track(
-        self, name: str, poses: FloatArray, entries: tuple[int, int] | None = None
-    ) -> ReactionTrack:
-        states = self.character.kinematics(poses)
-        return ReactionTrack(name, states.centers, states.quaternions, entries)
-
-    def _choose(self, base: Motion, prepared: PreparedImpact, trace: Trace) -> _Choice:
-        """The oracle's choice among all reactions and carrying on."""
-        assert trace.contact is not None
-        window = self.config.window
-        states = self.character.kinematics(trace.poses[trace.contact.frame :])
-        cut = trace_windows(states.centers, states.quaternions, window)
-        result = search(cut, self.windows)
-
-        # The base motion around the moment at which it must fit.
-        contact = prepared.start + trace.contact.frame
-        speed_change = self._speed_change(states, base, contact, prepared.push_duration_s)
-        graze = speed_change < self.config.graze_speed
-        leave_s = window.exit_min_s if graze else self.config.carry_on_exit_s
-        leave = round(leave_s * base.fps)
-        slack = round(self.config.carry_on_slack_s * base.fps)
-        first = max(0, contact + leave - slack)
-        last = contact + leave + slack
-        poses = base.sample(np.arange(first, last + window.window_frames) / base.fps)
-        own = library_windows([self._track(CARRY_ON, poses)], window)
-        late = make_windows(states.centers, states.quaternions, [leave], window)
-        carry_on = search(late, own)
-
-        best, stay = result.best, carry_on.best
-        stays = graze or stay.error <= min(best.error, self.config.carry_on_max_error)
-        chosen = stay if stays else best
-        return _Choice(
-            name=chosen.reaction,
-            motion=base if stays else self.library.reaction(best.reaction).motion,
-            exit=chosen.exit_frame,
-            # A base motion that ends holds its last pose.
-            entry=min(first + stay.entry_frame, len(base) - 1) if stays else best.entry_frame,
-            error=chosen.error,
-            oracle=result,
-            carry_on=carry_on,
-            graze=graze,
-            speed_change=speed_change,
+        count = len(batch.rows)
+        tell("simulating", 0, count)
+        traces = batch.simulation.look_ahead(self.config.horizon_s)
+        tell("choosing", 0, count)
+        seen = look_ahead_of(self.character, self.config, batch.bases, batch.prepared, traces)
+        choices: list[Choice | None] = [None] * count
+        for row, choice in zip(seen.rows, self.chooser.choose(seen), strict=True):
+            choices[row] = choice
+        tell("finishing", 0, count)
+        final = self._finish(batch.simulation, choices)
+        changes = dict(
+            zip(seen.rows, zip(seen.grazes, seen.speed_changes, strict=True), strict=True)
         )
-
-    def _speed_change(self, states: BodyStates, base: Motion, contact: int, push_s: float) -> float:
-        """What a hit has done to the speed of the centre of mass over the ground [m/s].
-
-        The difference of the simulation's and the base motion's mean velocities over 0.1 s from
-        contact on; after a push that lasts, over the last 0.1 s of it that the search can see.
-
-        Args:
-            states: The simulated bodies from contact on.
-            base: The base motion.
-            contact: The frame of the base motion at contact.
-            push_s: How long a push lasts [s], 0 for other hits.
-        """
-        frames = max(1, round(GRAZE_S * base.fps))
-        last = max(frames, round(min(push_s, self.config.window.exit_max_s) * base.fps))
-        first = last - frames
-        share = self.character.masses / self.character.masses.sum()
-        times = np.array([contact + first, contact + last]) / base.fps
-        own = self.character.kinematics(base.sample(times)).centers
-        moved = states.centers[last] - states.centers[first] - (own[1] - own[0])
-        return float(np.linalg.norm((share @ moved)[:2]) * base.fps / frames)
+        responses = []
+        for row, parts in enumerate(
+            zip(batch.bases, batch.prepared, traces, choices, final, strict=True)
+        ):
+            response = self._compose(*parts)
+            if response.choice is not None:
+                graze, change = changes[row]
+                response = replace(response, graze=bool(graze), speed_change=float(change))
+            responses.append(response)
+        tell("finishing", count, count)
+        return responses
 
     def _finish(
-        self, simulation: Simulation, choices: Sequence[_Choice | None]
+        self, simulation: Simulation, choices: Sequence[Choice | None]
     ) -> list[Trace | None]:
         """The rest of each simulation, tracking towards what was chosen, until the blend ends."""
         length = self.config.transition.blend_frames(simulation.fps)
@@ -260,7 +163,7 @@ class Responder:
         base: Motion,
         prepared: PreparedImpact,
         trace: Trace,
-        choice: _Choice | None,
+        choice: Choice | None,
         final: Trace | None,
     ) -> Response:
         """Put base motion, physics, blend and reaction together."""
@@ -294,7 +197,6 @@ class Responder:
         blend = blend_onto(simulated, placed[: length + 1])
         blend = raise_above(self.character, blend, base.fps)
         poses = np.concatenate([before, final.poses[:out], blend, placed[length + 1 :]])
-        found = zip(choice.oracle.names, choice.oracle.errors, strict=True)
         return replace(
             whole,
             motion=self._with_contacts(base, start, poses),
@@ -302,11 +204,9 @@ class Responder:
             exit=start + out,
             end=start + out + length,
             choice=choice.name,
-            entry=choice.entry,
+            entry=choice.entry + choice.offset if choice.offset else choice.entry,
             error=choice.error,
-            graze=choice.graze,
-            speed_change=choice.speed_change,
-            errors={n: float(e) for n, e in found} | {CARRY_ON: choice.carry_on.best.error},
+            errors=choice.errors,
             oracle=choice.oracle,
             carry_on=choice.carry_on,
             entered=choice.motion,
@@ -320,12 +220,6 @@ class Responder:
         states = self.character.kinematics(poses[start:])
         after = foot_contacts(self.character, states, base.fps)
         return Motion(poses, base.fps, base.name, np.concatenate([base.contacts[:start], after]))
-
-
-def _velocity(motion: Motion, frame: int) -> FloatArray:
-    """A motion's velocity (45,) at a frame, by the central difference where there is one."""
-    first = max(frame - 1, 0)
-    return pose_velocities(motion.poses[first : frame + 2], motion.fps)[frame - first]
 
 
 def _impactor_track(trace: Trace, start: int, frames: int) -> FloatArray | None:

@@ -96,15 +96,17 @@ class Response:
         exit: Frame at which the blend begins; None where there was no contact.
         end: Frame at which the blend has ended and the reaction goes on alone; None likewise.
         choice: Name of the reaction chosen, or `CARRY_ON`; None without contact.
-        entry: Frame of the reaction clip that was entered; of the base motion, when carried on.
+        entry: Frame of the reaction clip that was entered, fractional between two of them; of the
+            base motion, when carried on.
         error: Window error of the choice [m].
         graze: Whether the hit was a graze, so that the base motion is carried on whatever the
             errors; None without contact.
         speed_change: What the hit did to the speed of the centre of mass over the ground by 0.1 s
             after contact [m/s]; None likewise.
-        errors: Best window error of every reaction and of `CARRY_ON`.
-        oracle: What the search over the library found; None without contact.
-        carry_on: What the search over the base motion found; None without contact.
+        errors: Window error of everything that was aligned: with the oracle, of every reaction
+            and of `CARRY_ON`.
+        oracle: What the search over the library found; None where it was not searched.
+        carry_on: What the search over the base motion found; None likewise.
         entered: The motion entered, unplaced: the reaction's clip, or the base motion.
         left: (59,) where the simulation was one frame after the exit; None likewise.
         joined: (59,) where the reaction was one frame before the end; None likewise.
@@ -122,7 +124,7 @@ class Response:
     exit: int | None = None
     end: int | None = None
     choice: str | None = None
-    entry: int | None = None
+    entry: float | None = None
     error: float | None = None
     graze: bool | None = None
     speed_change: float | None = None

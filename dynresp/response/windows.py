@@ -29,6 +29,7 @@ __all__ = [
     "WindowSet",
     "facing_frames",
     "library_windows",
+    "make_many_windows",
     "make_windows",
     "trace_windows",
 ]
@@ -174,29 +175,58 @@ def make_windows(
         MotionError: Shapes do not fit, a value is not finite, a quaternion is not of unit length,
             or the track is too short for a window.
     """
-    position, quaternion = _checked_track(positions, quaternions, name)
+    tracks = (np.asarray(positions)[None], np.asarray(quaternions)[None])
+    return make_many_windows(*tracks, starts, config, name=name)[0]
+
+
+def make_many_windows(
+    positions: npt.ArrayLike,
+    quaternions: npt.ArrayLike,
+    starts: Iterable[int],
+    config: WindowErrorConfig,
+    *,
+    name: str = "track",
+) -> list[WindowSet]:
+    """Cut the same windows out of several tracks, bit for bit as out of each alone.
+
+    Args:
+        positions: (tracks, frames, bodies, 3) [m], body 0 the pelvis, Z up.
+        quaternions: (tracks, frames, bodies, 4), w x y z, unit length.
+        starts: First frame of each window.
+        config: Gives the length of the windows.
+        name: What error messages call the tracks.
+
+    Returns:
+        The windows of each track.
+
+    Raises:
+        MotionError: As `make_windows`.
+    """
+    position, quaternion = _checked_tracks(positions, quaternions, name)
     first = np.array(list(starts), dtype=np.int64)
     frames = config.window_frames
     if len(first) == 0:
         raise MotionError(f"{name}: no window asked for; give at least one first frame.")
-    if first.min() < 0 or first.max() + frames > len(position):
+    if first.min() < 0 or first.max() + frames > position.shape[1]:
         raise MotionError(
-            f"{name}: has {len(position)} frames; windows of {frames} frames that begin at frames "
-            f"{first.min()} to {first.max()} need {first.max() + frames}, and none may begin "
-            "before frame 0. Give a longer track or narrower bounds."
+            f"{name}: has {position.shape[1]} frames; windows of {frames} frames that begin at "
+            f"frames {first.min()} to {first.max()} need {first.max() + frames}, and none may "
+            "begin before frame 0. Give a longer track or narrower bounds."
         )
-    ground, yaw = facing_frames(position[first, 0], quaternion[first, 0])
-    turn = rotations.from_yaw(-yaw)[:, None, None]
+    ground, yaw = facing_frames(position[:, first, 0], quaternion[:, first, 0])
+    turn = rotations.from_yaw(-yaw)[:, :, None, None]
     rows = first[:, None] + np.arange(frames)
-    local = position[rows]
-    local[..., :2] -= ground[:, None, None]
+    local = position[:, rows]
+    local[..., :2] -= ground[:, :, None, None]
     states = np.concatenate(
-        [rotations.rotate(turn, local), rotations.multiply(turn, quaternion[rows])], axis=-1
+        [rotations.rotate(turn, local), rotations.multiply(turn, quaternion[:, rows])], axis=-1
     )
     padding = -len(first) % LANES
-    states = np.concatenate([states, np.repeat(states[-1:], padding, axis=0)])
-    data = np.ascontiguousarray(states.transpose(1, 2, 3, 0), dtype=np.float32)
-    return WindowSet(data=_read_only(data), starts=_read_only(first), config=config)
+    states = np.concatenate([states, np.repeat(states[:, -1:], padding, axis=1)], axis=1)
+    data = np.ascontiguousarray(states.transpose(0, 2, 3, 4, 1), dtype=np.float32)
+    _read_only(data)
+    starts_alike = _read_only(first)
+    return [WindowSet(data=own, starts=starts_alike, config=config) for own in data]
 
 
 def trace_windows(
@@ -288,32 +318,33 @@ def _entries(
     return range(first, last, config.entry_step)
 
 
-def _checked_track(
+def _checked_tracks(
     positions: npt.ArrayLike, quaternions: npt.ArrayLike, name: str
 ) -> tuple[FloatArray, FloatArray]:
-    """The track as float64 with quaternions of exactly unit length, or an error."""
+    """The tracks as float64 with quaternions of exactly unit length, or an error."""
     position = np.asarray(positions, dtype=np.float64)
     quaternion = np.asarray(quaternions, dtype=np.float64)
-    fits = position.ndim == 3 and position.shape[1] > 0 and position.shape[2] == 3
-    if not fits or quaternion.shape != (*position.shape[:2], 4):
+    fits = position.ndim == 4 and position.shape[2] > 0 and position.shape[3] == 3
+    if not fits or quaternion.shape != (*position.shape[:3], 4):
         raise MotionError(
-            f"{name}: positions have shape {position.shape}, quaternions {quaternion.shape}; "
-            "expected (frames, bodies, 3) and (frames, bodies, 4) with at least one body."
+            f"{name}: positions have shape {position.shape[1:]}, quaternions "
+            f"{quaternion.shape[1:]}; expected (frames, bodies, 3) and (frames, bodies, 4) with at "
+            "least one body."
         )
-    finite = np.isfinite(position).all(axis=2) & np.isfinite(quaternion).all(axis=2)
+    finite = np.isfinite(position).all(axis=3) & np.isfinite(quaternion).all(axis=3)
     if not finite.all():
-        frame, body = np.argwhere(~finite)[0]
+        _, frame, body = np.argwhere(~finite)[0]
         raise MotionError(
             f"{name}: {np.count_nonzero(~finite)} body states are not finite, the first at frame "
             f"{frame}, body {body}. Leave such frames out before searching."
         )
-    norms = np.linalg.norm(quaternion, axis=2)
+    norms = np.linalg.norm(quaternion, axis=3)
     off = np.abs(norms - 1.0) > _UNIT_TOLERANCE
     if off.any():
-        frame, body = np.argwhere(off)[0]
+        track, frame, body = np.argwhere(off)[0]
         raise MotionError(
             f"{name}: the quaternion at frame {frame}, body {body} has length "
-            f"{norms[frame, body]:.4g}; expected unit length, w x y z."
+            f"{norms[track, frame, body]:.4g}; expected unit length, w x y z."
         )
     return position, quaternion / norms[..., None]
 

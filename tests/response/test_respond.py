@@ -153,7 +153,9 @@ class TestAHit:
         _, trace = _simulated(character, base, response)
         seen = character.kinematics(trace.poses[response.contact.frame :])
         tracks = []
-        for reaction, windows in zip(library.reactions, responder.windows.windows, strict=True):
+        for reaction, windows in zip(
+            library.reactions, responder.chooser.windows.windows, strict=True
+        ):
             states = character.kinematics(reaction.motion.poses)
             bounds = (int(windows.starts[0]), int(windows.starts[-1]) + 1)
             # What is left of it is enough to blend onto and to be seen.

@@ -166,7 +166,7 @@ class TestSettings:
     def test_progress_is_told(self, responder: Responder, base: Motion) -> None:
         told: list[tuple[str, int, int]] = []
         responder.respond([(base, Ball(1.0)), (base, Push(1.0))], lambda *args: told.append(args))
-        assert {stage for stage, _, _ in told} == {"simulating", "choosing"}
+        assert {stage for stage, _, _ in told} == {"simulating", "choosing", "finishing"}
         assert all(0 <= done <= of for _, done, of in told)
 
 

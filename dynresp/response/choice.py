@@ -1,0 +1,35 @@
+"""What was decided for one hit: how it goes on, from when and from where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dynresp.motion.motion import Motion
+from dynresp.response.oracle import OracleResult
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A reaction, or to carry on with the base motion, and its timing.
+
+    Attributes:
+        name: Name of the reaction, or `CARRY_ON`.
+        motion: Its clip, or the base motion; read between its frames where there is an offset.
+        exit: Frame after contact at which the simulation is left.
+        entry: Frame of the motion that is entered.
+        offset: How much later than in the clip the motion's frames are, a part of a frame.
+        error: Window error there [m].
+        errors: Window error [m] of everything that was aligned, by name.
+        oracle: The search over the library, where all of it was searched.
+        carry_on: The search over the base motion, likewise.
+    """
+
+    name: str
+    motion: Motion
+    exit: int
+    entry: int
+    error: float
+    errors: dict[str, float]
+    offset: float = 0.0
+    oracle: OracleResult | None = None
+    carry_on: OracleResult | None = None

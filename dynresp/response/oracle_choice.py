@@ -1,0 +1,164 @@
+"""The choice of the oracle: all reactions and the base motion searched through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.motion.character import Character
+from dynresp.motion.library import ReactionLibrary
+from dynresp.response.choice import Choice
+from dynresp.response.look_ahead import LookAhead, base_poses, kinematics_of_many
+from dynresp.response.oracle import OracleResult, search
+from dynresp.response.response import CARRY_ON, ResponseConfig
+from dynresp.response.windows import (
+    LibraryWindows,
+    ReactionTrack,
+    library_windows,
+    make_many_windows,
+    make_windows,
+)
+
+
+@dataclass(frozen=True)
+class OracleAnswer:
+    """What the search found for one hit.
+
+    Attributes:
+        library: Of all reactions.
+        carry_on: Of the base motion around the moment at which it must fit.
+        carry_on_entry: Frame of the base motion where it fits best.
+        stays: Whether the base motion is carried on.
+    """
+
+    library: OracleResult
+    carry_on: OracleResult
+    carry_on_entry: int
+    stays: bool
+
+
+def reaction_tracks(
+    character: Character, library: ReactionLibrary, config: ResponseConfig
+) -> list[ReactionTrack]:
+    """Bodies of all reactions, with the frames at which each may be entered.
+
+    From its first frame to `entry_max_s`, as long as enough of it is left then.
+    """
+    fps = config.physics.fps
+    left = round(max(config.remaining_s, config.transition.blend_s + 2 / fps) * fps)
+    left = max(left, config.window.window_frames - 1)
+    latest = round(config.entry_max_s * fps) + 1
+    tracks = []
+    for reaction in library.reactions:
+        states = character.kinematics(reaction.motion.poses)
+        last = max(1, min(latest, len(reaction.motion) - left))
+        tracks.append(ReactionTrack(reaction.name, states.centers, states.quaternions, (0, last)))
+    return tracks
+
+
+def carry_on_exit(config: ResponseConfig, graze: bool) -> int:
+    """Frame after contact at which the base motion is gone back to."""
+    leave_s = config.window.exit_min_s if graze else config.carry_on_exit_s
+    return round(leave_s * config.physics.fps)
+
+
+class OracleChooser:
+    """Chooses by exhaustive search (Zordan et al. 2005; 2007, section 4).
+
+    A graze is carried on through. Else the reaction of the least window error is chosen, unless
+    the base motion, where it must fit, fits better still and well enough
+    (`ResponseConfig.carry_on_max_error`).
+    """
+
+    def __init__(
+        self, character: Character, library: ReactionLibrary, config: ResponseConfig
+    ) -> None:
+        """Cut the library's windows once.
+
+        Raises:
+            MotionError: A clip is shorter than a window.
+        """
+        self.character = character
+        self.library = library
+        self.config = config
+        tracks = reaction_tracks(character, library, config)
+        self.windows: LibraryWindows = library_windows(tracks, config.window)
+
+    def choose(self, hits: LookAhead) -> list[Choice]:
+        """Choose for each hit."""
+        choices = []
+        for base, answer in zip(hits.bases, self.answers(hits), strict=True):
+            best, stay = answer.library.best, answer.carry_on.best
+            found = zip(answer.library.names, answer.library.errors, strict=True)
+            chosen = stay if answer.stays else best
+            choices.append(
+                Choice(
+                    name=chosen.reaction,
+                    motion=base if answer.stays else self.library.reaction(best.reaction).motion,
+                    exit=chosen.exit_frame,
+                    entry=answer.carry_on_entry if answer.stays else best.entry_frame,
+                    error=chosen.error,
+                    errors={name: float(e) for name, e in found} | {CARRY_ON: stay.error},
+                    oracle=answer.library,
+                    carry_on=answer.carry_on,
+                )
+            )
+        return choices
+
+    def answers(self, hits: LookAhead) -> list[OracleAnswer]:
+        """Search for each hit; each is bitwise what it would be alone."""
+        if not len(hits):
+            return []
+        window = self.config.window
+        cuts = make_many_windows(
+            hits.states.centers, hits.states.quaternions, window.exit_frames, window
+        )
+        carried = self._carry_on(hits)
+        answers = []
+        for k, (cut, (stay, entry)) in enumerate(zip(cuts, carried, strict=True)):
+            found = search(cut, self.windows)
+            limit = min(found.best.error, self.config.carry_on_max_error)
+            stays = bool(hits.grazes[k]) or stay.best.error <= limit
+            answers.append(OracleAnswer(found, stay, entry, stays))
+        return answers
+
+    def _carry_on(self, hits: LookAhead) -> list[tuple[OracleResult, int]]:
+        """How the base motion fits, and the frame of it that fits best."""
+        window = self.config.window
+        slack = round(self.config.carry_on_slack_s * window.fps)
+        leaves = np.array([carry_on_exit(self.config, bool(graze)) for graze in hits.grazes])
+        firsts = hits.contacts + leaves - slack
+        near = firsts[:, None] + np.arange(2 * slack + window.window_frames)
+        own = kinematics_of_many(self.character, base_poses(hits.bases, near))
+        results = []
+        for k, leave in enumerate(leaves):
+            track = ReactionTrack(CARRY_ON, own.centers[k], own.quaternions[k])
+            late = make_windows(
+                hits.states.centers[k], hits.states.quaternions[k], [int(leave)], window
+            )
+            found = search(late, library_windows([track], window))
+            entry = int(firsts[k]) + found.best.entry_frame
+            # A base motion that has ended holds its last pose.
+            results.append((found, min(max(entry, 0), len(hits.bases[k]) - 1)))
+        return results
+
+
+def choice_columns(
+    answers: list[OracleAnswer],
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64], npt.NDArray[np.int64], list[int]]:
+    """What the oracle found for each hit as arrays over all classes, carrying on the last.
+
+    Returns:
+        Errors [m], exit frames after contact and entry frames, each (hits, reactions + 1), and
+        the class chosen for each hit. The entry of carrying on counts in the base motion.
+    """
+    errors = [[*a.library.errors, a.carry_on.best.error] for a in answers]
+    exits = [[*a.library.exit_frames, a.carry_on.best.exit_frame] for a in answers]
+    entries = [[*a.library.entry_frames, a.carry_on_entry] for a in answers]
+    chosen = [
+        len(a.library.names) if a.stays else a.library.names.index(a.library.best.reaction)
+        for a in answers
+    ]
+    return np.array(errors, np.float32), np.array(exits), np.array(entries), chosen
