@@ -57,36 +57,38 @@ class Simulation:
         self._batch = Batch(scene.model, len(self.setups), threads)
         self._controls = Controls(scene)
         self.read_ahead = self._controls.read_ahead
-        self._set_impactors()
-        self._set_start()
         # One row of integration state for each frame that has been reached, per simulation.
         self._states: list[list[FloatArray]] = [[] for _ in self.setups]
         self._contacts: list[Contact | None] = [None] * len(self.setups)
         self._diverged: list[Divergence | None] = [None] * len(self.setups)
+        self._fresh = self._batch.state[0].copy()
+        every = range(len(self.setups))
+        self._set_impactors(every)
+        self._set_start(every)
 
     # -- setting up ---------------------------------------------------------------------------
 
-    def _set_impactors(self) -> None:
-        """Mass, size and weight of each simulation's ball or fist."""
+    def _set_impactors(self, ids: Sequence[int]) -> None:
+        """Mass, size and weight of simulations' balls or fists."""
         if self.scene.kind is not ImpactorKind.PROJECTILE:
             return
         model = self.scene.model
         geom = model.geom("impactor/ball").id
         body = model.body("impactor/ball").id
-        radius = np.array([s.impact.radius for s in self.setups])
-        mass = np.array([s.impact.mass for s in self.setups])
-        self._batch.expand("geom_size")[:, geom, 0] = radius
-        self._batch.expand("geom_rbound")[:, geom] = radius
-        self._batch.expand("body_mass")[:, body] = mass
-        inertia = np.array([sphere_inertia(m, r) for m, r in zip(mass, radius, strict=True)])
-        self._batch.expand("body_inertia")[:, body] = inertia[:, None]
-        weightless = np.array([float(s.impact.weightless) for s in self.setups])
-        self._batch.expand("body_gravcomp")[:, body] = weightless
+        fields = ("geom_size", "geom_rbound", "body_mass", "body_inertia", "body_gravcomp")
+        size, bound, weight, inertia, lift = (self._batch.expand(name) for name in fields)
+        for i in ids:
+            impact = self.setups[i].impact
+            size[i, geom, 0] = bound[i, geom] = impact.radius
+            weight[i, body] = impact.mass
+            inertia[i, body] = sphere_inertia(impact.mass, impact.radius)
+            lift[i, body] = float(impact.weightless)
         self._batch.set_const()
 
-    def _set_start(self) -> None:
+    def _set_start(self, ids: Sequence[int]) -> None:
         qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
-        for i, setup in enumerate(self.setups):
+        for i in ids:
+            setup = self.setups[i]
             qpos[i, :POSE_SIZE] = setup.base[0]
             velocity = setup.velocity
             if velocity is None:
@@ -95,10 +97,33 @@ class Simulation:
             if setup.impact.impactor_pose is not None:
                 qpos[i, POSE_SIZE:] = setup.impact.impactor_pose
                 qvel[i, VELOCITY_SIZE:] = setup.impact.impactor_velocity
+            self._states[i] = [self._batch.state[i].copy()]
+
+    def replace(self, i: int, setup: Setup) -> None:
+        """Forget a simulation and put another where it was; the others are not disturbed.
+
+        Args:
+            i: Which simulation.
+            setup: The new one, for the same scene.
+        """
+        self.setups[i] = setup
+        self._batch.state[i] = self._fresh
+        self._contacts[i] = None
+        self._diverged[i] = None
+        self._set_impactors([i])
+        self._set_start([i])
 
     def contact(self, i: int) -> Contact | None:
-        """First contact of a simulation that has been run, None where there was none."""
+        """First contact of a simulation so far, None where there was none."""
         return self._contacts[i]
+
+    def diverged(self, i: int) -> Divergence | None:
+        """Where a simulation blew up, None where it did not."""
+        return self._diverged[i]
+
+    def frame(self, i: int) -> int:
+        """The last frame that a simulation has reached, counted from its start."""
+        return len(self._states[i]) - 1
 
     # -- running ------------------------------------------------------------------------------
 
@@ -115,43 +140,77 @@ class Simulation:
         Returns:
             A trace for each setup.
         """
-        horizon = int(np.ceil(horizon_s * self.fps - 1e-9))
-        due = [int(np.ceil((s.impact.due_s + WAIT_S) * self.fps)) for s in self.setups]
-        for i in range(len(self.setups)):
-            self._states[i] = [self._batch.state[i].copy()]
-        frame = 0
+        horizon = self.frames_of(horizon_s)
         while True:
             running = []
             for i in range(len(self.setups)):
                 contact = self._contacts[i]
-                last = due[i] if contact is None else contact.frame + horizon
-                if frame < last and self._diverged[i] is None:
+                last = self.due(i) if contact is None else contact.frame + horizon
+                if self.frame(i) < last and self._diverged[i] is None:
                     running.append(i)
             if not running:
                 break
-            self._advance_approach(np.array(running), frame)
-            frame += 1
-        return [self._trace(i) for i in range(len(self.setups))]
+            self.approach(running)
+        return [self.trace(i) for i in range(len(self.setups))]
 
-    def _advance_approach(self, ids: npt.NDArray[np.intp], frame: int) -> None:
-        """Run one frame; where the first contact falls into it, let the pelvis go from there."""
+    def due(self, i: int) -> int:
+        """The frame at which a simulation without contact counts as a miss."""
+        return int(np.ceil((self.setups[i].impact.due_s + WAIT_S) * self.fps))
+
+    def frames_of(self, seconds: float) -> int:
+        """Frames that last at least so long."""
+        return int(np.ceil(seconds * self.fps - 1e-9))
+
+    def approach(self, ids: Sequence[int]) -> None:
+        """Run one frame of simulations whose servos track the base motion.
+
+        Where there has been no contact the pelvis is held; where the first contact falls into
+        this frame, it is let go from there.
+
+        Args:
+            ids: Which simulations, increasing; none that has diverged.
+        """
+        rows = np.asarray(ids)
         held = np.array([self._contacts[i] is None for i in ids])
-        now = [frame] * len(ids)
+        now = [self.frame(i) for i in ids]
         controls = self._controls.pack(
             [self.setups[i].impact for i in ids], now, [self.setups[i].base for i in ids], now, held
         )
-        record = ("sensordata",) if self.scene.model.nsensordata else ()
-        found = self._run(ids, controls, record, now)
-        first = self._first_contacts(ids, held, found.get("sensordata"), frame)
+        record = ("sensordata",) if self.scene.model.nsensordata and held.any() else ()
+        found = self._run(rows, controls, record, now)
+        first = self._first_contacts(rows, held, found.get("sensordata"), now)
         if first:
-            rows = np.array(sorted(first))
-            for row in rows:
+            hit = np.array(sorted(first))
+            for row in hit:
                 controls[row, first[row] :, self._controls.hold] = 0.0
-            again = ids[rows]
-            self._batch.state[again] = [self._states[i][frame] for i in again]
-            self._run(again, controls[rows], (), [frame] * len(rows))
+            again = rows[hit]
+            self._batch.state[again] = [self._states[i][-1] for i in again]
+            self._run(again, controls[hit], (), [now[row] for row in hit])
         for i in ids:
             self._keep(i)
+
+    def go_on(self, i: int, frames: int) -> None:
+        """Run one simulation on along the base motion, all frames in one go.
+
+        Bitwise what as many calls of `approach` do, without their overhead.
+
+        Args:
+            i: Which simulation; one that has been hit.
+            frames: How many frames; none are run after one in which it diverges.
+        """
+        if frames < 1 or self._diverged[i] is not None:
+            return
+        setup, first = self.setups[i], self.frame(i)
+        now = range(first, first + frames)
+        controls = self._controls.pack(
+            [setup.impact] * frames, now, [setup.base] * frames, now, np.zeros(frames)
+        )
+        spec = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        row = controls.reshape(1, frames * self.substeps, -1)
+        found = self._run(np.array([i]), row, (spec,), [first], frames)
+        if self._diverged[i] is None:
+            ends = found[spec][0, self.substeps - 1 :: self.substeps]
+            self._states[i].extend(state.copy() for state in ends)
 
     def follow(
         self, ids: Sequence[int], frames: Sequence[int], targets: Sequence[FloatArray], length: int
@@ -174,39 +233,51 @@ class Simulation:
         frames = [frames[k] for k in order]
         targets = [targets[k] for k in order]
         for i, frame in zip(rows, frames, strict=True):
-            del self._states[i][frame + 1 :]
-            self._batch.state[i] = self._states[i][frame]
-            self._diverged[i] = None
+            self.rewind(i, frame)
         for step in range(length):
             alive = [k for k, i in enumerate(rows) if self._diverged[i] is None]
             if not alive:
                 break
-            running = rows[alive]
-            now = [frames[k] + step for k in alive]
-            controls = self._controls.pack(
-                [self.setups[i].impact for i in running],
-                now,
-                [targets[k] for k in alive],
-                [step] * len(alive),
-                np.zeros(len(alive)),
-            )
-            self._run(running, controls, (), now)
-            for i in running:
-                self._keep(i)
-        return [self._trace(i) for i in ids]
+            self.track([rows[k] for k in alive], [targets[k] for k in alive], [step] * len(alive))
+        return [self.trace(i) for i in ids]
+
+    def rewind(self, i: int, frame: int) -> None:
+        """Take a simulation back to an earlier frame, bitwise; its later frames are forgotten."""
+        del self._states[i][frame + 1 :]
+        self._batch.state[i] = self._states[i][frame]
+        self._diverged[i] = None
+
+    def track(
+        self, ids: Sequence[int], targets: Sequence[FloatArray], target_frames: Sequence[int]
+    ) -> None:
+        """Run one frame of simulations that are free and track targets of their own.
+
+        Args:
+            ids: Which simulations, increasing; none that has diverged.
+            targets: For each, (frames, 59) poses to track; after the last, the last holds.
+            target_frames: Where each is in its targets.
+        """
+        now = [self.frame(i) for i in ids]
+        impacts = [self.setups[i].impact for i in ids]
+        controls = self._controls.pack(impacts, now, targets, target_frames, np.zeros(len(ids)))
+        self._run(np.asarray(ids), controls, (), now)
+        for i in ids:
+            self._keep(i)
 
     def _run(
         self,
         ids: npt.NDArray[np.intp],
         controls: FloatArray,
-        record: tuple[str, ...],
+        record: tuple[str | int, ...],
         frames: Sequence[int],
-    ) -> dict[str, npt.NDArray[np.float64]]:
+        length: int = 1,
+    ) -> dict[str | int, npt.NDArray[np.float64]]:
+        """Run so many frames in one go and look for divergence."""
         # Of each warning the batch holds the last information and the count, which a simulation
         # that is reset begins anew.
         self._batch.warning[ids] = 0
         result = self._batch.rollout(
-            self.substeps, controls, self._controls.spec, record=record, ids=ids
+            length * self.substeps, controls, self._controls.spec, record=record, ids=ids
         )
         rose = self._batch.warning[ids, :, 1] > 0
         for row in map(int, np.flatnonzero(rose.any(axis=1))):
@@ -226,7 +297,7 @@ class Simulation:
         ids: npt.NDArray[np.intp],
         held: npt.NDArray[np.bool_],
         sensors: npt.NDArray[np.float64] | None,
-        frame: int,
+        frames: Sequence[int],
     ) -> dict[int, int]:
         """Rows whose first contact falls into this frame, with the step in which it does.
 
@@ -236,7 +307,7 @@ class Simulation:
         for row, i in enumerate(ids):
             if not held[row] or self._diverged[i] is not None:
                 continue
-            impact = self.setups[i].impact
+            impact, frame = self.setups[i].impact, frames[row]
             if impact.push_force is not None:
                 step = round((impact.push_start_s * self.fps - frame) * self.substeps)
                 if 0 <= step < self.substeps:
@@ -278,7 +349,8 @@ class Simulation:
         # Integration state begins with time, qpos, qvel (mjtState's order).
         return state[..., 1 : 1 + self.scene.model.nq]
 
-    def _trace(self, i: int) -> Trace:
+    def trace(self, i: int) -> Trace:
+        """All frames of a simulation so far."""
         states = np.stack(self._states[i])
         model = self.scene.model
         qpos = self._qpos(states)

@@ -307,3 +307,44 @@ def test_a_setup_of_one_frame_runs(
     short = Setup(whole.base[:1], whole.impact)
     a, b = Simulation(scene_of(ImpactorKind.NONE), [whole, short], 1).look_ahead(0.2)
     np.testing.assert_array_equal(a.poses, b.poses)
+
+
+def test_frames_run_in_one_go_are_those_run_one_by_one(
+    scene_of: SceneMaker, base: Motion, kind: ImpactorKind, character: Character
+) -> None:
+    simulation = simulation_of(scene_of(kind), base, _impacts(kind, character), 1)
+    traces = simulation.look_ahead(HORIZON_S)
+    again = simulation_of(scene_of(kind), base, _impacts(kind, character), 1)
+    for i, trace in enumerate(traces):
+        if trace.contact is None:
+            continue
+        while again.contact(i) is None:
+            again.approach([i])
+        left = len(trace.poses) - 1 - again.frame(i)
+        again.go_on(i, 4)
+        again.go_on(i, left - 4)
+        np.testing.assert_array_equal(again.trace(i).poses, trace.poses)
+        np.testing.assert_array_equal(again.trace(i).velocities, trace.velocities)
+        # And gone back to contact it goes the same way again.
+        again.rewind(i, trace.contact.frame)
+        again.go_on(i, 6)
+        np.testing.assert_array_equal(
+            again.trace(i).velocities, trace.velocities[: trace.contact.frame + 7]
+        )
+
+
+def test_a_simulation_put_where_another_was_is_what_it_would_be_alone(
+    scene_of: SceneMaker, base: Motion, kind: ImpactorKind, character: Character
+) -> None:
+    impacts = _impacts(kind, character)
+    simulation = simulation_of(scene_of(kind), base, impacts, 1)
+    others = simulation_of(scene_of(kind), base, impacts[:1] * len(impacts), 1)
+    others.look_ahead(HORIZON_S)
+    expected = simulation.look_ahead(HORIZON_S)
+    last = len(impacts) - 1
+    others.replace(last, simulation.setups[last])
+    before = others.trace(0)
+    traces = others.look_ahead(HORIZON_S)
+    np.testing.assert_array_equal(traces[last].velocities, expected[last].velocities)
+    assert traces[last].contact == expected[last].contact
+    np.testing.assert_array_equal(traces[0].velocities, before.velocities)
