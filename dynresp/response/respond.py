@@ -10,24 +10,18 @@ import numpy as np
 
 from dynresp.errors import MotionError
 from dynresp.motion.character import Character
-from dynresp.motion.floor import raise_above
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Impact, PreparedImpact
-from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Trace
 from dynresp.response.choice import Choice
+from dynresp.response.finish import ending, finish
 from dynresp.response.hits import HitBatch, HitStage
 from dynresp.response.look_ahead import LookAhead, look_ahead_of
 from dynresp.response.oracle_choice import OracleChooser
-from dynresp.response.response import CARRY_ON, Response, ResponseConfig
-from dynresp.response.transition import (
-    blend_onto,
-    blended_targets,
-    place_on,
-)
+from dynresp.response.response import Response, ResponseConfig
 
 
 class Chooser(Protocol):
@@ -104,59 +98,21 @@ class Responder:
         traces = batch.simulation.look_ahead(self.config.horizon_s)
         tell("choosing", 0, count)
         seen = look_ahead_of(self.character, self.config, batch.bases, batch.prepared, traces)
-        choices: list[Choice | None] = [None] * count
-        for row, choice in zip(seen.rows, self.chooser.choose(seen), strict=True):
-            choices[row] = choice
+        found = self.chooser.choose(seen)
+        choices = {int(row): choice for row, choice in zip(seen.rows, found, strict=True)}
         tell("finishing", 0, count)
-        final = self._finish(batch.simulation, choices)
-        changes = dict(
-            zip(seen.rows, zip(seen.grazes, seen.speed_changes, strict=True), strict=True)
-        )
-        responses = []
-        for row, parts in enumerate(
-            zip(batch.bases, batch.prepared, traces, choices, final, strict=True)
-        ):
-            response = self._compose(*parts)
-            if response.choice is not None:
-                graze, change = changes[row]
-                response = replace(response, graze=bool(graze), speed_change=float(change))
-            responses.append(response)
+        final = finish(batch.simulation, choices, self.config.transition)
+        responses = [
+            self._compose(base, prepared, trace, choices.get(row), final.get(row))
+            for row, (base, prepared, trace) in enumerate(
+                zip(batch.bases, batch.prepared, traces, strict=True)
+            )
+        ]
+        for row, graze, change in zip(seen.rows, seen.grazes, seen.speed_changes, strict=True):
+            told = replace(responses[row], graze=bool(graze), speed_change=float(change))
+            responses[row] = told
         tell("finishing", count, count)
         return responses
-
-    def _finish(
-        self, simulation: Simulation, choices: Sequence[Choice | None]
-    ) -> list[Trace | None]:
-        """The rest of each simulation, tracking towards what was chosen, until the blend ends."""
-        length = self.config.transition.blend_frames(simulation.fps)
-        final: list[Trace | None] = [None] * len(choices)
-        groups: dict[int, list[int]] = {}
-        targets: dict[int, FloatArray] = {}
-        frames: dict[int, int] = {}
-        for i, choice in enumerate(choices):
-            if choice is None:
-                continue
-            contact = simulation.contact(i)
-            assert contact is not None
-            exit_frame = contact.frame + choice.exit
-            back = contact.frame if self.config.transition.second_pass else exit_frame
-            lead = exit_frame - back
-            setup = simulation.setups[i]
-            # As far as the servos read ahead.
-            stop = exit_frame + length + simulation.read_ahead
-            until = np.minimum(np.arange(back, stop), len(setup.base) - 1)
-            targets[i] = blended_targets(
-                setup.base[until], choice.motion.poses, choice.entry, lead, lead + length
-            )
-            frames[i] = back
-            groups.setdefault(lead + length, []).append(i)
-        for steps, rows in groups.items():
-            traces = simulation.follow(
-                rows, [frames[i] for i in rows], [targets[i] for i in rows], steps
-            )
-            for i, trace in zip(rows, traces, strict=True):
-                final[i] = trace
-        return final
 
     def _compose(
         self,
@@ -169,12 +125,12 @@ class Responder:
         """Put base motion, physics, blend and reaction together."""
         start = prepared.start
         before = base.poses[:start]
-        shown = round(self.config.carry_on_s * base.fps)
         whole = Response(base, start, prepared, trace.contact)
         if choice is None or final is None or final.diverged is not None:
             last = final or trace
             if last.diverged is None:
                 # A miss: the base motion goes on as if nothing had been.
+                shown = round(self.config.carry_on_s * base.fps)
                 poses = base.poses[: start + len(last.poses) + shown]
             else:
                 poses = np.concatenate([before, last.poses])
@@ -185,18 +141,8 @@ class Responder:
         assert trace.contact is not None
         length = self.config.transition.blend_frames(base.fps)
         out = trace.contact.frame + choice.exit
-        simulated = final.poses[out : out + length + 1]
-        left = len(choice.motion) - choice.entry
-        if choice.name == CARRY_ON:
-            left = min(left, length + 1 + shown)
-        # Where a motion ends before the blend does, its last pose holds.
-        at = choice.entry + np.arange(max(left, length + 2))
-        entered = choice.motion.poses[np.minimum(at, len(choice.motion) - 1)]
-        placed = place_on(entered, 0, simulated[0])
-        # Halfway between two poses that stand, legs can reach below the floor.
-        blend = blend_onto(simulated, placed[: length + 1])
-        blend = raise_above(self.character, blend, base.fps)
-        poses = np.concatenate([before, final.poses[:out], blend, placed[length + 1 :]])
+        end = ending(self.character, self.config, final.poses[out : out + length + 1], choice)
+        poses = np.concatenate([before, final.poses[:out], end.poses])
         return replace(
             whole,
             motion=self._with_contacts(base, start, poses),
@@ -210,8 +156,8 @@ class Responder:
             oracle=choice.oracle,
             carry_on=choice.carry_on,
             entered=choice.motion,
-            left=simulated[1],
-            joined=placed[length - 1],
+            left=end.left,
+            joined=end.joined,
             impactor=_impactor_track(final, start, len(poses)),
         )
 
