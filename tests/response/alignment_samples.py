@@ -1,0 +1,45 @@
+"""Small motions, and reactions to align with them."""
+
+import numpy as np
+
+from dynresp.bench.oracle import synthetic_track
+from dynresp.motion import rotations
+from dynresp.response.alignment import Aligner, Alignment, AlignmentConfig
+from dynresp.response.windows import ReactionTrack, WindowErrorConfig
+from tests.oracles.alignment import Track, interpolated
+
+BODIES = 5
+WINDOW = WindowErrorConfig(fps=30.0, window_s=5 / 30, exit_min_s=2 / 30, exit_max_s=12 / 30)
+FRAMES = 12 + 5
+ALL = AlignmentConfig(sets_without_gain=99)
+
+
+def smooth_track(seed: int, frames: int = FRAMES, bodies: int = BODIES) -> Track:
+    rest = np.random.default_rng(99).normal(scale=0.4, size=(bodies, 3))
+    return synthetic_track(np.random.default_rng(seed), rest, frames)
+
+
+def flipped(track: Track, seed: int) -> Track:
+    """The same motion, half of its quaternions with the other sign."""
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(*track[1].shape[:2], 1))
+    return track[0], track[1] * signs
+
+
+def placed(track: Track, x: float, y: float, yaw: float) -> Track:
+    turn = rotations.from_yaw(yaw)
+    moved = rotations.rotate(turn, track[0]) + np.array([x, y, 0.0])
+    return moved, rotations.multiply(turn, track[1])
+
+
+def reactions(*seeds: int, frames: int = 24) -> list[ReactionTrack]:
+    return [ReactionTrack(f"reaction {seed}", *smooth_track(seed, frames)) for seed in seeds]
+
+
+def align_one(aligner: Aligner, trace: Track, reaction: str | None = None) -> Alignment:
+    return aligner.align(*trace, [reaction or aligner.names[0]])[0]
+
+
+def sliding(offset: float, frames: int = 40) -> tuple[Track, ReactionTrack]:
+    """A reaction, and a trace that is the reaction from a frame on that lies between two."""
+    clip = smooth_track(3, frames)
+    return interpolated(clip, offset, FRAMES), ReactionTrack("itself", *clip)
