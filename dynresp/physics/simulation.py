@@ -89,7 +89,7 @@ class Simulation:
         qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         for i in ids:
             setup = self.setups[i]
-            qpos[i, :POSE_SIZE] = setup.base[0]
+            qpos[i, :POSE_SIZE] = setup.base[0] if setup.pose is None else setup.pose
             velocity = setup.velocity
             if velocity is None:
                 velocity = pose_velocities(setup.base[:2], self.fps)[0]
@@ -164,21 +164,22 @@ class Simulation:
     def approach(self, ids: Sequence[int]) -> None:
         """Run one frame of simulations whose servos track the base motion.
 
-        Where there has been no contact the pelvis is held; where the first contact falls into
-        this frame, it is let go from there.
+        Where there has been no contact the pelvis is held, unless the setup says otherwise; where
+        the first contact falls into this frame, it is let go from there.
 
         Args:
             ids: Which simulations, increasing; none that has diverged.
         """
         rows = np.asarray(ids)
-        held = np.array([self._contacts[i] is None for i in ids])
+        waiting = np.array([self._contacts[i] is None for i in ids])
+        held = waiting & [self.setups[i].held for i in ids]
         now = [self.frame(i) for i in ids]
         controls = self._controls.pack(
             [self.setups[i].impact for i in ids], now, [self.setups[i].base for i in ids], now, held
         )
-        record = ("sensordata",) if self.scene.model.nsensordata and held.any() else ()
+        record = ("sensordata",) if self.scene.model.nsensordata and waiting.any() else ()
         found = self._run(rows, controls, record, now)
-        first = self._first_contacts(rows, held, found.get("sensordata"), now)
+        first = self._first_contacts(rows, waiting, found.get("sensordata"), now)
         if first:
             hit = np.array(sorted(first))
             for row in hit:
@@ -189,28 +190,30 @@ class Simulation:
         for i in ids:
             self._keep(i)
 
-    def go_on(self, i: int, frames: int) -> None:
-        """Run one simulation on along the base motion, all frames in one go.
+    def go_on(self, ids: Sequence[int], frames: int) -> None:
+        """Run simulations on along their base motions, all frames in one go.
 
         Bitwise what as many calls of `approach` do, without their overhead.
 
         Args:
-            i: Which simulation; one that has been hit.
-            frames: How many frames; none are run after one in which it diverges.
+            ids: Which simulations, increasing; none that has not been hit or has diverged.
+            frames: How many frames; one that diverges in any of them keeps none of them.
         """
-        if frames < 1 or self._diverged[i] is not None:
+        if frames < 1 or not len(ids):
             return
-        setup, first = self.setups[i], self.frame(i)
-        now = range(first, first + frames)
+        now = [self.frame(i) + k for i in ids for k in range(frames)]
+        setups = [self.setups[i] for i in ids for _ in range(frames)]
         controls = self._controls.pack(
-            [setup.impact] * frames, now, [setup.base] * frames, now, np.zeros(frames)
+            [s.impact for s in setups], now, [s.base for s in setups], now, np.zeros(len(now))
         )
+        rows = controls.reshape(len(ids), frames * self.substeps, -1)
         spec = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        row = controls.reshape(1, frames * self.substeps, -1)
-        found = self._run(np.array([i]), row, (spec,), [first], frames)
-        if self._diverged[i] is None:
-            ends = found[spec][0, self.substeps - 1 :: self.substeps]
-            self._states[i].extend(state.copy() for state in ends)
+        first = [self.frame(i) for i in ids]
+        found = self._run(np.asarray(ids), rows, (spec,), first, frames)[spec]
+        for row, i in enumerate(ids):
+            if self._diverged[i] is None:
+                ends = found[row, self.substeps - 1 :: self.substeps]
+                self._states[i].extend(state.copy() for state in ends)
 
     def follow(
         self, ids: Sequence[int], frames: Sequence[int], targets: Sequence[FloatArray], length: int
@@ -295,7 +298,7 @@ class Simulation:
     def _first_contacts(
         self,
         ids: npt.NDArray[np.intp],
-        held: npt.NDArray[np.bool_],
+        waiting: npt.NDArray[np.bool_],
         sensors: npt.NDArray[np.float64] | None,
         frames: Sequence[int],
     ) -> dict[int, int]:
@@ -305,7 +308,7 @@ class Simulation:
         """
         first: dict[int, int] = {}
         for row, i in enumerate(ids):
-            if not held[row] or self._diverged[i] is not None:
+            if not waiting[row] or self._diverged[i] is not None:
                 continue
             impact, frame = self.setups[i].impact, frames[row]
             if impact.push_force is not None:
@@ -348,6 +351,10 @@ class Simulation:
     def _qpos(self, state: FloatArray) -> FloatArray:
         # Integration state begins with time, qpos, qvel (mjtState's order).
         return state[..., 1 : 1 + self.scene.model.nq]
+
+    def pose(self, i: int) -> FloatArray:
+        """(59,) the last pose that a simulation has reached."""
+        return self._qpos(self._states[i][-1])[:POSE_SIZE].copy()
 
     def trace(self, i: int) -> Trace:
         """All frames of a simulation so far."""

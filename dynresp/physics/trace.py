@@ -18,11 +18,16 @@ class Setup:
         impact: What hits.
         velocity: (45,) the base motion's velocity at that frame, a row of `qvel`; None takes it
             from the first two frames of `base`.
+        pose: (59,) where the character is at the start, if that is not where `base` begins.
+        held: Whether its pelvis is held to the base motion until contact. A character that has
+            just been hit is not: the simulation takes over from where it is.
     """
 
     base: FloatArray
     impact: PreparedImpact
     velocity: FloatArray | None = None
+    pose: FloatArray | None = None
+    held: bool = True
 
 
 @dataclass(frozen=True)

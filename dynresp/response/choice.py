@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from dynresp.motion.motion import Motion
+from dynresp.response.look_ahead import LookAhead
 from dynresp.response.oracle import OracleResult
 
 
@@ -33,3 +35,10 @@ class Choice:
     offset: float = 0.0
     oracle: OracleResult | None = None
     carry_on: OracleResult | None = None
+
+
+class Chooser(Protocol):
+    """What decides how hits go on."""
+
+    def choose(self, hits: LookAhead) -> list[Choice]:
+        """Choose for each hit."""

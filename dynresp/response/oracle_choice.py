@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from dynresp.motion.character import Character
 from dynresp.motion.library import ReactionLibrary
+from dynresp.response.carry_on import search_base_motions
 from dynresp.response.choice import Choice
-from dynresp.response.look_ahead import LookAhead, base_poses, kinematics_of_many
+from dynresp.response.look_ahead import LookAhead
 from dynresp.response.oracle import OracleResult, search
 from dynresp.response.response import CARRY_ON, ResponseConfig
 from dynresp.response.windows import (
@@ -18,7 +19,6 @@ from dynresp.response.windows import (
     ReactionTrack,
     library_windows,
     make_many_windows,
-    make_windows,
 )
 
 
@@ -56,12 +56,6 @@ def reaction_tracks(
         last = max(1, min(latest, len(reaction.motion) - left))
         tracks.append(ReactionTrack(reaction.name, states.centers, states.quaternions, (0, last)))
     return tracks
-
-
-def carry_on_exit(config: ResponseConfig, graze: bool) -> int:
-    """Frame after contact at which the base motion is gone back to."""
-    leave_s = config.window.exit_min_s if graze else config.carry_on_exit_s
-    return round(leave_s * config.physics.fps)
 
 
 class OracleChooser:
@@ -115,7 +109,8 @@ class OracleChooser:
         cuts = make_many_windows(
             hits.states.centers, hits.states.quaternions, window.exit_frames, window
         )
-        carried = self._carry_on(hits)
+        every = range(len(hits))
+        carried = search_base_motions(self.character, self.config, hits, every)
         answers = []
         for k, (cut, (stay, entry)) in enumerate(zip(cuts, carried, strict=True)):
             found = search(cut, self.windows)
@@ -123,26 +118,6 @@ class OracleChooser:
             stays = bool(hits.grazes[k]) or stay.best.error <= limit
             answers.append(OracleAnswer(found, stay, entry, stays))
         return answers
-
-    def _carry_on(self, hits: LookAhead) -> list[tuple[OracleResult, int]]:
-        """How the base motion fits, and the frame of it that fits best."""
-        window = self.config.window
-        slack = round(self.config.carry_on_slack_s * window.fps)
-        leaves = np.array([carry_on_exit(self.config, bool(graze)) for graze in hits.grazes])
-        firsts = hits.contacts + leaves - slack
-        near = firsts[:, None] + np.arange(2 * slack + window.window_frames)
-        own = kinematics_of_many(self.character, base_poses(hits.bases, near))
-        results = []
-        for k, leave in enumerate(leaves):
-            track = ReactionTrack(CARRY_ON, own.centers[k], own.quaternions[k])
-            late = make_windows(
-                hits.states.centers[k], hits.states.quaternions[k], [int(leave)], window
-            )
-            found = search(late, library_windows([track], window))
-            entry = int(firsts[k]) + found.best.entry_frame
-            # A base motion that has ended holds its last pose.
-            results.append((found, min(max(entry, 0), len(hits.bases[k]) - 1)))
-        return results
 
 
 def choice_columns(

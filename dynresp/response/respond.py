@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -16,19 +15,12 @@ from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Impact, PreparedImpact
 from dynresp.physics.trace import Trace
-from dynresp.response.choice import Choice
+from dynresp.response.choice import Choice, Chooser
 from dynresp.response.finish import ending, finish
 from dynresp.response.hits import HitBatch, HitStage
-from dynresp.response.look_ahead import LookAhead, look_ahead_of
+from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.oracle_choice import OracleChooser
 from dynresp.response.response import Response, ResponseConfig
-
-
-class Chooser(Protocol):
-    """What decides how hits go on."""
-
-    def choose(self, hits: LookAhead) -> list[Choice]:
-        """Choose for each hit."""
 
 
 class Responder:

@@ -321,13 +321,13 @@ def test_frames_run_in_one_go_are_those_run_one_by_one(
         while again.contact(i) is None:
             again.approach([i])
         left = len(trace.poses) - 1 - again.frame(i)
-        again.go_on(i, 4)
-        again.go_on(i, left - 4)
+        again.go_on([i], 4)
+        again.go_on([i], left - 4)
         np.testing.assert_array_equal(again.trace(i).poses, trace.poses)
         np.testing.assert_array_equal(again.trace(i).velocities, trace.velocities)
         # And gone back to contact it goes the same way again.
         again.rewind(i, trace.contact.frame)
-        again.go_on(i, 6)
+        again.go_on([i], 6)
         np.testing.assert_array_equal(
             again.trace(i).velocities, trace.velocities[: trace.contact.frame + 7]
         )

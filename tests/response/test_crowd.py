@@ -1,0 +1,232 @@
+"""Characters at run time: events in their order, one continuous motion, second hits, misses."""
+
+import numpy as np
+import pytest
+
+from dynresp.errors import MotionError, SpecError
+from dynresp.motion import rotations
+from dynresp.motion.character import Character
+from dynresp.motion.library import ReactionLibrary
+from dynresp.motion.motion import Motion
+from dynresp.physics.impacts import Ball, Impact, Punch, Push
+from dynresp.response.crowd import Crowd
+from dynresp.response.dynamic import DynamicResponder, EventKind, Phase
+from dynresp.response.response import CARRY_ON, Response, ResponseConfig
+from dynresp.response.transition import TransitionConfig
+from tests.physics.samples import walking
+from tests.response.samples import FLUFF, HITS
+
+HARD = Ball(1.0, speed=12.0, mass=8.0)
+
+
+def _crowd(
+    character: Character, library: ReactionLibrary, *bases: Motion, second_pass: bool = False
+) -> Crowd:
+    config = ResponseConfig(transition=TransitionConfig(second_pass=second_pass))
+    return Crowd(character, library, bases, config, threads=1)
+
+
+def _kinds(responder: DynamicResponder) -> list[EventKind]:
+    return [event.kind for event in responder.events]
+
+
+def _run_until(crowd: Crowd, phase: Phase, most: int = 200) -> None:
+    for _ in range(most):
+        if crowd.responders[0].phase is phase:
+            return
+        crowd.advance()
+    raise AssertionError(f"never {phase}")
+
+
+def _is_continuous(motion: Motion) -> None:
+    """No joint leaps and no root does: what a hit of that size does is well below."""
+    quaternions = motion.poses[:, 3:].reshape(len(motion), 14, 4)
+    steps = rotations.angle_between(quaternions[:-1], quaternions[1:])
+    assert steps.max() * motion.fps < 35.0
+    assert np.linalg.norm(np.diff(motion.poses[:, :3], axis=0), axis=1).max() * motion.fps < 5.0
+
+
+@pytest.mark.parametrize("which", range(len(HITS)))
+def test_a_hit_is_answered_as_by_the_responder(
+    character: Character,
+    library: ReactionLibrary,
+    base: Motion,
+    responses: list[Response],
+    which: int,
+) -> None:
+    expected = responses[which]
+    crowd = _crowd(character, library, base)
+    crowd.responders[0].hit(HITS[which])
+    for _ in range(len(expected.motion) - 1):
+        crowd.advance()
+    shown = crowd.responders[0].shown
+    # What is carried on goes on longer here than a response shows it.
+    length = min(len(shown), len(expected.motion))
+    # Times are rounded otherwise, and a simulation makes more of it.
+    np.testing.assert_allclose(shown.poses[:length], expected.motion.poses[:length], atol=1e-5)
+    chosen = [event for event in crowd.responders[0].events if event.kind is EventKind.CHOSEN]
+    assert chosen[0].choice is not None
+    assert chosen[0].choice.name == expected.choice
+    frames = {event.kind: event.frame for event in crowd.responders[0].events}
+    assert frames[EventKind.INVOKED] == expected.start
+    assert frames[EventKind.CONTACT] == expected.contact_frame
+    assert frames[EventKind.BLEND_BEGUN] == expected.exit
+    assert frames[EventKind.BLEND_ENDED] == expected.end
+
+
+def test_events_come_as_in_the_paper(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    crowd.responders[0].hit(HARD)
+    for _ in range(100):
+        crowd.advance()
+    assert _kinds(crowd.responders[0]) == [
+        EventKind.INVOKED,
+        EventKind.CONTACT,
+        EventKind.CHOSEN,
+        EventKind.REWOUND,
+        EventKind.BLEND_BEGUN,
+        EventKind.BLEND_ENDED,
+    ]
+    frames = [event.frame for event in crowd.responders[0].events]
+    assert frames == sorted(frames)
+
+
+def test_a_second_pass_tracks_the_choice_from_the_contact_on(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    shown = []
+    for second_pass in (False, True):
+        crowd = _crowd(character, library, base, second_pass=second_pass)
+        crowd.responders[0].hit(HARD)
+        for _ in range(80):
+            crowd.advance()
+        shown.append(crowd.responders[0].shown.poses)
+        contact = crowd.responders[0].events[1].frame
+    np.testing.assert_array_equal(shown[0][: contact + 1], shown[1][: contact + 1])
+    assert (
+        np.abs(shown[0][contact + 2 : contact + 6] - shown[1][contact + 2 : contact + 6]).max() > 0
+    )
+
+
+def test_a_character_in_a_crowd_is_bitwise_what_it_is_alone(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    other = walking(character, 5.0, speed=0.8, yaw=-2.0)
+    bases = [base, other, base, other]
+    hits: list[list[Impact]] = [
+        [HARD],
+        [Push(0.4), Ball(2.0, from_deg=90.0)],
+        [Punch(1.1, target="chest"), Ball(1.9, offset=3.0)],
+        [],
+    ]
+    together = _crowd(character, library, *bases)
+    for responder, own in zip(together.responders, hits, strict=True):
+        for hit in own:
+            responder.hit(hit)
+    alone = []
+    for base_motion, own in zip(bases, hits, strict=True):
+        crowd = _crowd(character, library, base_motion)
+        for hit in own:
+            crowd.responders[0].hit(hit)
+        alone.append(crowd)
+    for _ in range(110):
+        poses = together.advance()
+        for row, crowd in enumerate(alone):
+            np.testing.assert_array_equal(crowd.advance()[0], poses[row])
+    for responder, crowd in zip(together.responders, alone, strict=True):
+        assert _kinds(responder) == _kinds(crowd.responders[0])
+
+
+@pytest.mark.parametrize("phase", [Phase.PHYSICS, Phase.BLEND, Phase.PLAYING])
+def test_a_second_hit_takes_over_from_where_the_character_is(
+    character: Character, library: ReactionLibrary, base: Motion, phase: Phase
+) -> None:
+    crowd = _crowd(character, library, base)
+    responder = crowd.responders[0]
+    responder.hit(HARD)
+    _run_until(crowd, Phase.PHYSICS)
+    _run_until(crowd, phase)
+    before = responder.pose.copy()
+    responder.hit(Push(0.0, 900.0, 0.2, from_deg=90.0))
+    crowd.advance()
+    assert responder.events[-4].kind is EventKind.INVOKED
+    assert np.abs(responder.pose - before).max() < 0.2
+    for _ in range(80):
+        crowd.advance()
+    assert _kinds(responder).count(EventKind.CHOSEN) == 2
+    assert responder.phase is Phase.PLAYING
+    _is_continuous(responder.shown)
+
+
+def test_a_second_ball_hits_a_character_in_the_blend(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    responder = crowd.responders[0]
+    responder.hit(HARD)
+    _run_until(crowd, Phase.BLEND)
+    responder.hit(Ball(0.25, speed=9.0, from_deg=180.0))
+    for _ in range(90):
+        crowd.advance()
+    assert _kinds(responder).count(EventKind.CONTACT) == 2
+    _is_continuous(responder.shown)
+
+
+@pytest.mark.parametrize("when", ["playing", "in physics"])
+def test_after_a_miss_it_goes_back_to_what_it_did(
+    character: Character, library: ReactionLibrary, base: Motion, when: str
+) -> None:
+    crowd = _crowd(character, library, base)
+    responder = crowd.responders[0]
+    if when == "in physics":
+        responder.hit(HARD)
+        _run_until(crowd, Phase.PHYSICS)
+    responder.hit(Ball(0.3, speed=10.0, offset=4.0))
+    for _ in range(60):
+        crowd.advance()
+    assert EventKind.MISSED in _kinds(responder)
+    assert responder.phase is Phase.PLAYING
+    _is_continuous(responder.shown)
+    if when == "playing":
+        np.testing.assert_allclose(responder.pose, base.poses[60], atol=1e-12)
+
+
+def test_a_light_hit_is_carried_on_through(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    crowd.responders[0].hit(Ball(1.0, **FLUFF))
+    for _ in range(100):
+        crowd.advance()
+    choice = crowd.responders[0].events[2].choice
+    assert choice is not None
+    assert choice.name == CARRY_ON
+
+
+def test_after_its_last_frame_a_motion_holds_and_can_be_hit(
+    character: Character, library: ReactionLibrary
+) -> None:
+    crowd = _crowd(character, library, walking(character, 1.0))
+    for _ in range(60):
+        crowd.advance()
+    crowd.responders[0].hit(HARD)
+    for _ in range(60):
+        crowd.advance()
+    assert EventKind.CHOSEN in _kinds(crowd.responders[0])
+
+
+def test_what_cannot_come_is_refused(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    responder = crowd.responders[0]
+    with pytest.raises(SpecError, match=r"due at 0\.05 s; .* from 0\.2"):
+        responder.hit(Ball(0.05))
+    responder.hit(Ball(1.0))
+    with pytest.raises(SpecError, match=r"on its way until 1\.00 s from now"):
+        responder.hit(Ball(1.1))
+    responder.hit(Ball(1.5))
+    with pytest.raises(MotionError, match="has 60 fps"):
+        _crowd(character, library, walking(character, 1.0, fps=60.0))
