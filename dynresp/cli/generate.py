@@ -1,0 +1,143 @@
+"""`dynresp generate`: from a plan file to a folder of training data."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from dynresp.cli.options import Json, Motions, Seed
+from dynresp.cli.progress import Tell, progress
+
+# Time over which the rate is measured [s]; a bar is refreshed, and lines follow, this often [s].
+_RATE_S = 60.0
+_BAR_S, _LINE_S = 0.5, 20.0
+
+
+def generate(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="The plan file.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the dataset.")],
+    count: Annotated[
+        int | None,
+        typer.Option(
+            "--count", min=1, max=10_000_000, help="How many samples, in place of the plan's."
+        ),
+    ] = None,
+    seed: Seed = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", min=1, max=1024, help="Processes here; by default one a core."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="A Dask scheduler whose workers do it, as tcp://host:8786 or tls://host:8786.",
+        ),
+    ] = None,
+    shard_size: Annotated[
+        int | None,
+        typer.Option("--shard-size", min=1, max=100_000, help="Samples of a file; by default 500."),
+    ] = None,
+    motions: Motions = None,
+    as_json: Json = False,
+) -> None:
+    """Make training data: draw hits from a plan, simulate them, and let the oracle choose.
+
+    However it was interrupted, the same command goes on where it stopped. A larger --count extends
+    the dataset; damaged files are found and made again.
+    """
+    from dynresp.datasets.plan_reading import read_plan
+    from dynresp.errors import UsageError
+
+    if scheduler is not None and workers is not None:
+        raise UsageError(
+            "--workers is of this machine, and with --scheduler the cluster's workers do it; give "
+            "one of them"
+        )
+    file = read_plan(plan).changed(count, seed)
+    with progress() as tell:
+        tell("reading", 0, 1)
+        from dynresp.datasets import generate as making
+
+        summary = making.generate(
+            file, plan.parent, out, motions, workers, scheduler, shard_size, _paced(tell), _warn
+        )
+    content = summary.to_json()
+    typer.echo(json.dumps(content, indent=2) if as_json else _told(content))
+
+
+def _paced(tell: Tell) -> Tell:
+    """Adds rate and time left to what is told while samples are made."""
+    on_terminal = sys.stderr.isatty()
+    every = _BAR_S if on_terminal else _LINE_S
+    seen: deque[tuple[float, int]] = deque()
+    said, said_at = "", 0.0
+
+    def paced(stage: str, done: int, of: int) -> None:
+        nonlocal said, said_at
+        now = time.monotonic()
+        if stage != "labelling":
+            seen.clear()
+            said = stage
+        else:
+            seen.append((now, done))
+            while now - seen[0][0] > _RATE_S:
+                seen.popleft()
+            if not said.startswith(stage) or now - said_at >= every:
+                said = _pace(stage, done, of, seen, counted=not on_terminal)
+                said_at = now
+        tell(said, done, of)
+
+    return paced
+
+
+def _pace(stage: str, done: int, of: int, seen: deque[tuple[float, int]], counted: bool) -> str:
+    words = [stage]
+    if counted:
+        words.append(f"{done} of {of}")
+    (began, first), (now, last) = seen[0], seen[-1]
+    if now > began and last > first:
+        rate = (last - first) / (now - began)
+        words += [f"{rate:.3g} samples/s", f"{_duration((of - done) / rate)} left"]
+    return ", ".join(words)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+
+
+def _warn(manifest: Mapping[str, Any]) -> None:
+    """Say where built-in motions stand in for motion capture."""
+    from dynresp.cli.telling import tell_substitutes
+
+    for base in manifest["bases"]:
+        said = tell_substitutes({"base": base, "library": manifest["library"]})
+        if said:
+            typer.echo(f"dynresp: {said}", err=True)
+            break
+
+
+def _told(content: dict[str, Any]) -> str:
+    lines = [
+        f"{content['samples']} samples in {content['shards']} shards",
+        f"  outcomes   {content['hits']} hits, {content['misses']} misses, "
+        f"{content['diverged']} diverged",
+        f"  made       {content['shards_made']} shards"
+        + (f", {content['shards_remade']} made again" if content["shards_remade"] else ""),
+    ]
+    if content["samples_per_s"] is not None:
+        lines.append(f"  rate       {content['samples_per_s']:.3g} samples/s")
+    lines.append(f"  written    {content['folder']}")
+    return "\n".join(lines)

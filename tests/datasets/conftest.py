@@ -1,0 +1,56 @@
+"""A small dataset, made once, and the world it was made in."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dynresp.datasets import generate as making
+from dynresp.datasets.shards import Place
+from dynresp.datasets.work import Job, World
+
+from .samples import plan
+
+
+@pytest.fixture(scope="session")
+def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+    """The plan's world; motions are looked for in an empty folder."""
+    empty = tmp_path_factory.mktemp("motions")
+    return World(plan(), empty, empty)
+
+
+@pytest.fixture
+def made_in_this_process(world: World, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Has one worker, which is this process; lists the shards that it makes.
+
+    Only for the plan of these tests, whatever its count.
+    """
+    made: list[int] = []
+
+    def make(job: Job, wanted: Sequence[Place], *rest: Any) -> Iterator[tuple[Place, bytes]]:
+        for place in wanted:
+            made.append(place.number)
+            yield place, world.make(place)
+
+    class SameWorld:
+        def __new__(cls, plan: Any, *rest: Any) -> Any:
+            return world if plan == world.plan else World(plan, *rest)
+
+    monkeypatch.setattr(making, "make_here", make)
+    monkeypatch.setattr(making, "World", SameWorld)
+    return made
+
+
+@pytest.fixture(scope="session")
+def dataset(world: World, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The plan's dataset: 20 samples in shards of 8, made by this process. Not to be changed."""
+    from dynresp.datasets.manifest import write_manifest
+    from dynresp.datasets.shards import places
+
+    folder = tmp_path_factory.mktemp("dataset")
+    manifest = world.manifest(8)
+    for place in places(manifest["identity"], 20, 8):
+        (folder / place.name).write_bytes(world.make(place))
+    write_manifest(manifest, folder)
+    return folder

@@ -1,0 +1,48 @@
+"""docs/datasets.md says what is."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from dynresp.datasets.generate import Summary
+from dynresp.datasets.plan import KINDS, Plan
+from dynresp.datasets.plan_reading import parse_plan
+from dynresp.datasets.schema import columns
+from dynresp.paths import examples_folder
+
+TEXT = (Path(__file__).parents[2] / "docs/datasets.md").read_text(encoding="utf-8")
+
+
+def test_its_plan_is_right() -> None:
+    (text,) = re.findall(r"^```toml\n(.*?)^```", TEXT, re.M | re.S)
+    assert parse_plan(tomllib.loads(text)).plan.count == 5000
+
+
+def test_all_columns_are_explained_in_order() -> None:
+    (section,) = re.findall(r"^# The files.*?(?=^# )", TEXT, re.M | re.S)
+    rows = re.findall(r"^\| (`[^|]*) \| ([a-z0-9\[\]]+) \|", section, re.M)
+    told = [(name, kind) for names, kind in rows for name in re.findall(r"`(\w+)`", names)]
+    types = {"<i8": "int64", "<i4": "int32", "<i2": "int16", "|i1": "int8", "|b1": "bool",
+             "<f8": "double", "<f4": "float"}  # fmt: skip
+    widths = {3: "[3]", 7: "[features]", 5: "[classes]", 0: ""}
+    assert told == [(c.name, types[c.dtype] + widths[c.width]) for c in columns(7, 5)]
+
+
+@pytest.mark.parametrize("table", ["plan", "base", "impact", "library", "settings"])
+def test_all_tables_of_a_plan_are_explained(table: str) -> None:
+    assert set(Plan.model_fields) == {"plan", "base", "impact", "library", "settings"}
+    assert re.search(rf"^\| `\[+{table}\]+` \|", TEXT, re.M)
+
+
+def test_all_that_is_told_at_the_end_is_explained() -> None:
+    for key in Summary(Path()).to_json():
+        assert f"`{key}`" in TEXT, key
+
+
+def test_all_example_plans_are_named() -> None:
+    for file in (examples_folder() / "plans").glob("*.toml"):
+        assert f"`{file.stem}`" in TEXT, file
+    for kind in KINDS:
+        assert f'`"{kind}"`' in TEXT
