@@ -113,3 +113,15 @@ def cache_folder() -> Path:
             "name a folder (it is made when needed) or unset the variable."
         )
     return folder
+
+
+def classifier_file(library_identity: str) -> Path:
+    """Where the classifier of a library is kept for this user; may not exist yet.
+
+    Args:
+        library_identity: Of the reaction library, which includes the character's.
+
+    Raises:
+        UsageError: `DYNRESP_CACHE` names something that is not a folder.
+    """
+    return cache_folder() / "classifiers" / f"{library_identity}.skops"

@@ -31,6 +31,7 @@ from dynresp.physics.impacts import Ball
 from dynresp.response.quality import measure
 from dynresp.response.respond import Responder
 from dynresp.response.response import CARRY_ON
+from dynresp.response.surface import landscape
 
 character = default_character()
 library = default_library(character=character)
@@ -61,11 +62,10 @@ print(f"choice: {response.choice}, window error {response.error:.2f} m")
 # the colour plate of Zordan et al. 2007): the error mostly grows with time under physics.
 
 # %%
-chosen = response.carry_on if response.choice == CARRY_ON else response.oracle
-surface = chosen.surface(response.choice)
+surface = landscape(response, character, responder.config)
 fig, ax = plt.subplots(figsize=(7, 4))
 image = ax.pcolormesh(
-    surface.entry_frames / 30.0, surface.exit_frames / 30.0, surface.errors, cmap="viridis_r"
+    surface.entries_s, surface.exits_s, surface.errors, cmap="viridis_r"
 )
 ax.set(
     xlabel="entry: time in the reaction [s]",

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynresp.cli.options import Json, Seed
+from dynresp.cli.options import ChosenClassifier, Json, Motions, Seed
 
 if TYPE_CHECKING:
     from dynresp.bench.measure import BenchResult
@@ -35,6 +36,58 @@ def oracle(seed: Seed = None, as_json: Json = False) -> None:
     from dynresp.bench import oracle as bench
 
     _print(bench.run(seed or 0), as_json)
+
+
+@app.command()
+def align(seed: Seed = None, as_json: Json = False) -> None:
+    """Time to align one reaction, and its error, against exhaustive alignment."""
+    typer.echo("simulating and aligning for about ten seconds ...", err=True)
+    from dynresp.bench import align as bench
+
+    _print(bench.run(seed or 0), as_json)
+
+
+@app.command()
+def select(
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            metavar="FILE",
+            help="File that `dynresp train` has written; by default a synthetic problem.",
+        ),
+    ] = None,
+    seed: Seed = None,
+    as_json: Json = False,
+) -> None:
+    """Time to predict which reaction fits, against scikit-learn's own predict."""
+    typer.echo("training and predicting for about ten seconds ...", err=True)
+    from dynresp.bench import select as bench
+
+    _print(bench.run(seed or 0, model=model), as_json)
+
+
+@app.command()
+def respond(
+    classifier: ChosenClassifier = None,
+    motions: Motions = None,
+    seed: Seed = None,
+    as_json: Json = False,
+) -> None:
+    """Time from a hit to a finished plan on one core, with every budget."""
+    typer.echo("throwing balls for about half a minute ...", err=True)
+    from dynresp.bench import respond as bench
+
+    _print(bench.run(seed or 0, classifier, motions), as_json)
+
+
+@app.command()
+def generate(motions: Motions = None, seed: Seed = None, as_json: Json = False) -> None:
+    """Labelled samples a second on one core, against a loop hit by hit."""
+    typer.echo("labelling for about ten seconds ...", err=True)
+    from dynresp.bench import generate as bench
+
+    _print(bench.run(seed or 0, motions), as_json)
 
 
 def _print(result: BenchResult, as_json: bool) -> None:

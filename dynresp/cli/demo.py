@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from dynresp.cli.options import Json, Motions, Seed
-from dynresp.cli.run import answer
+from dynresp.cli.options import ChosenBudget, Json, Motions, Seed
+from dynresp.cli.run import answer, choice_of
 
 EXAMPLE = "walk_ball.toml"
 """The example that is shown, in the folder of examples."""
@@ -20,6 +20,7 @@ def demo(
     ] = Path("dynresp-demo"),
     motions: Motions = None,
     seed: Seed = None,
+    budget: ChosenBudget = None,
     as_json: Json = False,
 ) -> None:
     """Run the shipped example: a heavy ball, a walking person.
@@ -28,4 +29,4 @@ def demo(
     """
     from dynresp.paths import examples_folder
 
-    answer(examples_folder() / EXAMPLE, out, motions, seed, as_json)
+    answer(examples_folder() / EXAMPLE, out, motions, seed, as_json, choice_of(budget, None))

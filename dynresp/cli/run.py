@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dynresp.cli.options import Json, Motions, Seed
+from dynresp.cli.options import Budget, ChosenBudget, ChosenClassifier, Json, Motions, Seed
 from dynresp.cli.progress import progress
 
 
@@ -19,6 +19,8 @@ def run(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")],
     motions: Motions = None,
     seed: Seed = None,
+    budget: ChosenBudget = None,
+    classifier: ChosenClassifier = None,
     as_json: Json = False,
 ) -> None:
     """Run an experiment: hit the character, and write how it goes on.
@@ -27,11 +29,22 @@ def run(
     where the machine can render, video.mp4; of a batch summary.json, table.csv and the same files
     for some of the hits.
     """
-    answer(experiment, out, motions, seed, as_json)
+    answer(experiment, out, motions, seed, as_json, choice_of(budget, classifier))
+
+
+def choice_of(budget: Budget | None, classifier: Path | None) -> dict[str, str]:
+    """What the command line says of `[choice]`."""
+    said = {} if budget is None else {"budget": budget.value}
+    return said if classifier is None else {**said, "classifier": str(classifier.absolute())}
 
 
 def answer(
-    experiment: Path, out: Path, motions: Path | None, seed: int | None, as_json: bool
+    experiment: Path,
+    out: Path,
+    motions: Path | None,
+    seed: int | None,
+    as_json: bool,
+    choice: dict[str, str],
 ) -> None:
     """Run an experiment file and print what came of it.
 
@@ -41,28 +54,29 @@ def answer(
         motions: Motions folder that the user named.
         seed: Taken instead of the file's own.
         as_json: Print `result.json` or `summary.json` instead of text.
+        choice: Keys of `[choice]` that are taken instead of the file's own.
 
     Raises:
         typer.Exit: With code 1, where every simulation diverged, or a file could not be written;
             a video on a machine that cannot draw is none.
         DynrespError: It could not be done.
     """
-    from dynresp.cli.telling import tell_result, tell_substitutes, tell_summary
+    from dynresp.cli.telling import tell_choosing, tell_result, tell_substitutes, tell_summary
     from dynresp.experiments.folder import WRITTEN, is_failure
     from dynresp.experiments.reading import read_experiment
     from dynresp.experiments.result import to_json
 
     file = read_experiment(experiment)
-    _check_folder(out)
+    check_folder(out)
     with progress() as tell:
         tell("loading motions", 0, 1)
         from dynresp.experiments.runner import prepare_run, run_experiment
 
-        loaded = prepare_run(file, experiment.parent, motions, seed)
+        loaded = prepare_run(file, experiment.parent, motions, seed, choice=choice)
         content = run_experiment(loaded, out, tell)
-    substitutes = tell_substitutes(content)
-    if substitutes:
-        typer.echo(f"dynresp: {substitutes}", err=True)
+    for remark in (tell_substitutes(content), tell_choosing(content)):
+        if remark:
+            typer.echo(f"dynresp: {remark}", err=True)
     for name, what in content["files"].items():
         if what != WRITTEN:
             typer.echo(f"dynresp: {name} {what}", err=True)
@@ -79,7 +93,7 @@ def answer(
         raise typer.Exit(1)
 
 
-def _check_folder(out: Path) -> None:
+def check_folder(out: Path) -> None:
     """Refuse, before any work, to write where nothing can be written."""
     from dynresp.errors import UsageError
 

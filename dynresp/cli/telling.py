@@ -94,6 +94,24 @@ def tell_substitutes(content: dict[str, Any]) -> str | None:
     )
 
 
+def tell_choosing(content: dict[str, Any]) -> str | None:
+    """What there is to know about how it was chosen, or None if nothing is.
+
+    Args:
+        content: Of `result.json` or `summary.json`.
+    """
+    about = content["choosing"]
+    if "instead_of" in about:
+        return (
+            f"the oracle chose: there is no classifier for the library {content['library']['name']}"
+            " on this machine; `dynresp generate` and `dynresp train` make one (docs/learning.md)"
+        )
+    differing = about.get("classifier", {}).get("other_settings")
+    if differing:
+        return f"the classifier was trained with other settings: {', '.join(differing)}"
+    return None
+
+
 def _motion(about: dict[str, Any]) -> str:
     name = about["motion"]
     return f"{name}, for want of {about['instead_of']}" if "instead_of" in about else str(name)

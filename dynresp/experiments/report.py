@@ -21,7 +21,8 @@ from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
 from dynresp.physics.impacts import Strike
 from dynresp.response.quality import Quality
-from dynresp.response.response import CARRY_ON, Response
+from dynresp.response.response import Response, ResponseConfig
+from dynresp.response.surface import landscape
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, how many are done, and of how many."""
@@ -36,6 +37,7 @@ def write_response(
     about: dict[str, Any],
     output: OutputTable,
     character: Character,
+    config: ResponseConfig,
     progress: Progress,
 ) -> dict[str, Any]:
     """Write one response to a folder.
@@ -52,6 +54,7 @@ def write_response(
         about: What `result.json` says about the whole experiment.
         output: What to write.
         character: The character.
+        config: Settings by which it was made.
         progress: Told the stage, how many are done, and of how many.
 
     Returns:
@@ -98,7 +101,7 @@ def write_response(
         "motion.bvh": motion,
         "recording.html": recording,
         "filmstrip.png": filmstrip,
-        "alignment.png": lambda path: _write_alignment(path, response, title),
+        "alignment.png": lambda path: _write_alignment(path, response, title, character, config),
         "video.mp4": video,
     }
     names: Sequence[str] = [name for name in get_args(Artefact) if name in output.write]
@@ -114,26 +117,22 @@ def write_response(
     return content
 
 
-def _write_alignment(path: Path, response: Response, title: str) -> None:
-    """The error surface of the choice."""
+def _write_alignment(
+    path: Path, response: Response, title: str, character: Character, config: ResponseConfig
+) -> None:
+    """The errors among which the choice was aligned."""
     from dynresp.view.plots import RankedReaction, write_alignment
 
     if response.exit is None or response.contact_frame is None or response.choice is None:
         raise NothingToShowError(f"the outcome is a {outcome(response)}, so nothing was aligned")
-    assert response.oracle is not None
-    assert response.carry_on is not None
     assert response.entry is not None
     fps = response.motion.fps
-    carried_on = response.choice == CARRY_ON
-    found = response.carry_on if carried_on else response.oracle
-    surface = found.surface(response.choice)
-    # The base motion was searched around the moment at which it must fit; count from its start.
-    before = response.entry - found.match(response.choice).entry_frame
+    found = landscape(response, character, config)
     write_alignment(
         path,
-        surface.errors,
-        surface.exit_frames / fps,
-        (surface.entry_frames + before) / fps,
+        found.errors,
+        found.exits_s,
+        found.entries_s,
         (response.exit - response.contact_frame) / fps,
         response.entry / fps,
         title=f"{title}: {spoken(response.choice)}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from dynresp.errors import MotionError, SpecError
 from dynresp.experiments import batch
+from dynresp.experiments.choosing import Choosing, take_chooser
 from dynresp.experiments.folder import (
     RESULT,
     SUMMARY,
@@ -57,6 +58,7 @@ class Run:
         base: The base motion.
         striker: The second character's motion, of a strike.
         library: The reactions.
+        choosing: What chooses among them.
         config: Settings.
         threads: Threads for the physics, 0 for all cores.
     """
@@ -67,13 +69,16 @@ class Run:
     base: Taken
     striker: Taken | None
     library: ReactionLibrary
+    choosing: Choosing
     config: ResponseConfig
     threads: int = 0
     responder: Responder = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Cut the library's windows."""
-        responder = Responder(self.character, self.library, self.config, self.threads)
+        """Make the responder."""
+        responder = Responder(
+            self.character, self.library, self.config, self.threads, self.choosing.chooser
+        )
         object.__setattr__(self, "responder", responder)
 
     def hits(self, numbers: range) -> list[Hit]:
@@ -112,6 +117,7 @@ class Run:
         return {
             **told,
             "library": about_library(self.library, self.experiment.library.which),
+            "choosing": self.choosing.about,
             "settings": in_force(self.config),
             "output": self.experiment.output.model_dump(),
             "character": self.character.identity,
@@ -125,6 +131,7 @@ def prepare_run(
     motions: Path | None = None,
     seed: int | None = None,
     threads: int = 0,
+    choice: Mapping[str, str] | None = None,
 ) -> Run:
     """Load all that an experiment needs.
 
@@ -134,6 +141,7 @@ def prepare_run(
         motions: Motions folder that the user named.
         seed: Taken instead of the file's own.
         threads: Threads for the physics, 0 for all cores.
+        choice: Keys of `[choice]` that are taken instead of the file's own.
 
     Raises:
         MissingMotionDataError: A motion is not on this machine.
@@ -163,10 +171,12 @@ def prepare_run(
     library = take_library(experiment.library.which, folders, beside, fps, character)
     chosen = experiment.experiment.seed if seed is None else seed
     try:
-        run = Run(experiment, chosen, character, base, striker, library, config, threads)
+        asked = experiment.choice.model_copy(update=dict(choice or {}))
+        choosing = take_chooser(asked, character, library, config, beside)
     except MotionError as error:
         # A clip of the library that is shorter than a window.
         raise SpecError(f"settings.window_s: {error}") from None
+    run = Run(experiment, chosen, character, base, striker, library, choosing, config, threads)
     _check_times(run)
     return run
 
@@ -213,7 +223,7 @@ def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dic
     def write(answer: Answer, where: Path, title: str) -> dict[str, Any]:
         return write_response(
             where, title, answer.hit, answer.response, answer.quality, about,
-            run.experiment.output, run.character, tell,
+            run.experiment.output, run.character, run.config, tell,
         )  # fmt: skip
 
     if table.count == 1:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidat
 
 from dynresp.errors import UnknownNameError
 from dynresp.experiments.values import Name, Number, fixed, name, number, shown, whole
+from dynresp.response.budget import Budget
 
 MAX_COUNT = 100_000
 """Most hits of one experiment."""
@@ -189,6 +190,13 @@ class LibraryTable(Strict):
     which: Annotated[str, Field(min_length=1, max_length=1000)] = "core"
 
 
+class ChoiceTable(Strict):
+    """`[choice]`: how much is spent on choosing, and with which classifier."""
+
+    budget: Budget = "fast"
+    classifier: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+
+
 class SettingsTable(Strict):
     """`[settings]`: how simulation, search and blend run; what is left out keeps its default."""
 
@@ -223,5 +231,6 @@ class Experiment(Strict):
     base: BaseMotion
     impact: Annotated[tuple[AnyImpact], BeforeValidator(_one_impact), Field(strict=False)]
     library: LibraryTable = LibraryTable()
+    choice: ChoiceTable = ChoiceTable()
     settings: SettingsTable = SettingsTable()
     output: OutputTable = OutputTable()

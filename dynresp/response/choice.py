@@ -7,7 +7,6 @@ from typing import Protocol
 
 from dynresp.motion.motion import Motion
 from dynresp.response.look_ahead import LookAhead
-from dynresp.response.oracle import OracleResult
 
 
 @dataclass(frozen=True)
@@ -22,8 +21,6 @@ class Choice:
         offset: How much later than in the clip the motion's frames are, a part of a frame.
         error: Window error there [m].
         errors: Window error [m] of everything that was aligned, by name.
-        oracle: The search over the library, where all of it was searched.
-        carry_on: The search over the base motion, likewise.
     """
 
     name: str
@@ -33,8 +30,6 @@ class Choice:
     error: float
     errors: dict[str, float]
     offset: float = 0.0
-    oracle: OracleResult | None = None
-    carry_on: OracleResult | None = None
 
 
 class Chooser(Protocol):

@@ -44,6 +44,7 @@ class Crowd:
         config: ResponseConfig | None = None,
         chooser: Chooser | None = None,
         threads: int = 0,
+        stage: HitStage | None = None,
     ) -> None:
         """Make ready.
 
@@ -54,6 +55,8 @@ class Crowd:
             config: Settings.
             chooser: What chooses; None for the oracle.
             threads: Threads for the physics, 0 for all cores.
+            stage: Where scenes are kept, for several crowds of one body and the same settings;
+                None for one of its own.
 
         Raises:
             MotionError: A motion has another frame rate.
@@ -71,7 +74,7 @@ class Crowd:
         )
         self._character = character
         self._chooser = chooser or OracleChooser(character, library, self.config)
-        self._stage = HitStage(character, self.config, threads)
+        self._stage = stage or HitStage(character, self.config, threads)
         self._simulations: dict[ImpactorKind, Simulation] = {}
         # A base motion that is carried on goes on to its end.
         self._endless = replace(self.config, carry_on_s=1e6)

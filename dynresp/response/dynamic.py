@@ -155,12 +155,15 @@ class DynamicResponder:
         Raises:
             SpecError: It comes too soon, or while something else is on its way.
         """
-        prepared = self._prepared(impact, impact.time)
-        now_s = self.frame / self.physics.fps
-        due = self.frame + int(np.ceil(impact.time * self.physics.fps))
-        new = Invoked(
-            replace(impact, time=impact.time + now_s), self.frame + prepared[0].start, due
-        )
+        fps = self.physics.fps
+        asked = replace(impact, time=impact.time + self.frame / fps)
+        _, _, launch = self._prepared(asked)
+        if launch < self.frame:
+            raise SpecError(
+                f"time: the impact is due {impact.time:g} s from now and needs "
+                f"{impact.time + (self.frame - launch) / fps:.2f} s to come"
+            )
+        new = Invoked(asked, launch, int(np.ceil(asked.time * fps)))
         for other in self._on_their_way():
             if new.launch <= other.due and other.launch <= new.due:
                 raise SpecError(
@@ -180,7 +183,7 @@ class DynamicResponder:
             return None
         self._invoked.remove(coming[0])
         impact = coming[0].impact
-        prepared, base = self._prepared(impact, impact.time - self.frame / self.physics.fps)
+        prepared, base, _ = self._prepared(impact)
         playing = self.phase is Phase.PLAYING
         setup = Setup(
             base.poses,
@@ -222,15 +225,27 @@ class DynamicResponder:
     def _on_their_way(self) -> list[Invoked]:
         return [invoked for invoked in self._invoked if invoked.due >= self.frame]
 
-    def _prepared(self, impact: Impact, time: float) -> tuple[PreparedImpact, Motion]:
-        """A hit due at a time from now [s], and what the character would do from now on."""
-        needed = int(np.ceil((max(time, 0.0) + _BEYOND_S) * self.physics.fps))
-        base = Motion(self._ahead(needed), self.physics.fps, self._name)
-        due = replace(impact, time=time)
-        return prepare(due, base, self.character, self.physics), base
+    def _prepared(self, impact: Impact) -> tuple[PreparedImpact, Motion, int]:
+        """A hit made ready: for the simulation, what the character would do, and when it begins.
 
-    def _ahead(self, needed: int) -> FloatArray:
-        """What it would do without a further hit, at least so many frames of it from now on."""
+        Args:
+            impact: Its time is that of the character's clock.
+        """
+        fps = self.physics.fps
+        last = int(np.ceil((impact.time + _BEYOND_S) * fps))
+        poses, first = self._ahead(max(last - self.frame, 1))
+        whole = Motion(poses, fps, self._name)
+        due = replace(impact, time=impact.time - first / fps)
+        prepared = prepare(due, whole, self.character, self.physics)
+        base = whole.slice(prepared.start, len(whole)) if prepared.start else whole
+        return replace(prepared, start=0), base, first + prepared.start
+
+    def _ahead(self, needed: int) -> tuple[FloatArray, int]:
+        """What it would do without a further hit, for at least so many frames from now.
+
+        Returns:
+            Poses (frames, 59), and when the first of them is due: now or before.
+        """
         flight = self.flight
         if self.phase is Phase.PHYSICS and flight is not None and flight.choice is not None:
             # What was chosen, as if it were entered by the clock from where the character is.
@@ -238,9 +253,9 @@ class DynamicResponder:
             poses = flight.choice.motion.poses
             frames = max(needed, len(poses) - entry)
             at = np.clip(entry + np.arange(frames), 0, len(poses) - 1)
-            return place_on(poses[at], 0, self.pose)
-        left = len(self._plan) - (self.frame - self._plan_from)
-        return self.planned(self.frame, max(needed, left))
+            return place_on(poses[at], 0, self.pose), self.frame
+        until = max(self.frame + needed, self._plan_from + len(self._plan))
+        return self.planned(self._plan_from, until - self._plan_from), self._plan_from
 
     def _velocity(self) -> FloatArray:
         """How it moves now (45,)."""

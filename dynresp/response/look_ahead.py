@@ -47,6 +47,11 @@ class LookAhead:
         """Number of hits."""
         return len(self.rows)
 
+    def states_of(self, hit: int) -> BodyStates:
+        """Bodies (frames, bodies, ...) of one hit."""
+        states = self.states
+        return BodyStates(states.positions[hit], states.quaternions[hit], states.centers[hit])
+
 
 def look_ahead_of(
     character: Character,

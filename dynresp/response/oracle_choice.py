@@ -46,16 +46,21 @@ def reaction_tracks(
 
     From its first frame to `entry_max_s`, as long as enough of it is left then.
     """
+    tracks = []
+    for reaction in library.reactions:
+        states = character.kinematics(reaction.motion.poses)
+        bounds = entry_range(len(reaction.motion), config)
+        tracks.append(ReactionTrack(reaction.name, states.centers, states.quaternions, bounds))
+    return tracks
+
+
+def entry_range(frames: int, config: ResponseConfig) -> tuple[int, int]:
+    """Frames [first, last) at which a reaction of so many frames may be entered."""
     fps = config.physics.fps
     left = round(max(config.remaining_s, config.transition.blend_s + 2 / fps) * fps)
     left = max(left, config.window.window_frames - 1)
     latest = round(config.entry_max_s * fps) + 1
-    tracks = []
-    for reaction in library.reactions:
-        states = character.kinematics(reaction.motion.poses)
-        last = max(1, min(latest, len(reaction.motion) - left))
-        tracks.append(ReactionTrack(reaction.name, states.centers, states.quaternions, (0, last)))
-    return tracks
+    return 0, max(1, min(latest, frames - left))
 
 
 class OracleChooser:
@@ -95,8 +100,6 @@ class OracleChooser:
                     entry=answer.carry_on_entry if answer.stays else best.entry_frame,
                     error=chosen.error,
                     errors={name: float(e) for name, e in found} | {CARRY_ON: stay.error},
-                    oracle=answer.library,
-                    carry_on=answer.carry_on,
                 )
             )
         return choices

@@ -100,9 +100,13 @@ class Responder:
                 zip(batch.bases, batch.prepared, traces, strict=True)
             )
         ]
-        for row, graze, change in zip(seen.rows, seen.grazes, seen.speed_changes, strict=True):
-            told = replace(responses[row], graze=bool(graze), speed_change=float(change))
-            responses[row] = told
+        for k, row in enumerate(seen.rows):
+            responses[row] = replace(
+                responses[row],
+                graze=bool(seen.grazes[k]),
+                speed_change=float(seen.speed_changes[k]),
+                looked_ahead=seen.states_of(k),
+            )
         tell("finishing", count, count)
         return responses
 
@@ -145,8 +149,6 @@ class Responder:
             entry=choice.entry + choice.offset if choice.offset else choice.entry,
             error=choice.error,
             errors=choice.errors,
-            oracle=choice.oracle,
-            carry_on=choice.carry_on,
             entered=choice.motion,
             left=end.left,
             joined=end.joined,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 
 from dynresp.errors import UsageError
+from dynresp.motion.character import BodyStates
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import PreparedImpact
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Contact, Divergence
-from dynresp.response.oracle import OracleResult
 from dynresp.response.transition import TransitionConfig
 from dynresp.response.windows import WindowErrorConfig
 
@@ -105,8 +105,7 @@ class Response:
             after contact [m/s]; None likewise.
         errors: Window error of everything that was aligned: with the oracle, of every reaction
             and of `CARRY_ON`.
-        oracle: What the search over the library found; None where it was not searched.
-        carry_on: What the search over the base motion found; None likewise.
+        looked_ahead: Bodies that the choice was made from, from contact on; None without contact.
         entered: The motion entered, unplaced: the reaction's clip, or the base motion.
         left: (59,) where the simulation was one frame after the exit; None likewise.
         joined: (59,) where the reaction was one frame before the end; None likewise.
@@ -129,8 +128,7 @@ class Response:
     graze: bool | None = None
     speed_change: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
-    oracle: OracleResult | None = None
-    carry_on: OracleResult | None = None
+    looked_ahead: BodyStates | None = None
     entered: Motion | None = None
     left: FloatArray | None = None
     joined: FloatArray | None = None

@@ -14,6 +14,9 @@ COMMANDS = (
     (),
     ("run",),
     ("demo",),
+    ("generate",),
+    ("train",),
+    ("evaluate",),
     ("motions",),
     ("motions", "list"),
     ("motions", "show"),
@@ -25,9 +28,16 @@ COMMANDS = (
     ("bench",),
     ("bench", "physics"),
     ("bench", "oracle"),
+    ("bench", "select"),
+    ("bench", "align"),
+    ("bench", "respond"),
+    ("bench", "generate"),
 )
 # Packages that take long to import; help must do without them.
-HEAVY = ("numpy", "mujoco", "scipy", "numba", "pydantic", "matplotlib", "viser", "requests")
+HEAVY = (
+    "numpy", "mujoco", "scipy", "numba", "pydantic", "matplotlib", "viser", "requests",
+    "sklearn", "skops", "pyarrow", "distributed",
+)  # fmt: skip
 
 
 def process(*words: object) -> list[str]:

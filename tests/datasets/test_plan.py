@@ -7,7 +7,7 @@ import pytest
 from dynresp.datasets.plan import Plan, plain
 from dynresp.datasets.plan_reading import parse_plan, read_plan
 from dynresp.errors import SpecError
-from dynresp.experiments.reading import MAX_FILE_BYTES
+from dynresp.experiments.mistakes import MAX_FILE_BYTES
 from dynresp.experiments.values import Choice, Uniform
 from dynresp.paths import examples_folder
 

@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 
 from dynresp.errors import SpecError
-from dynresp.experiments.reading import MAX_FILE_BYTES, parse_experiment, read_experiment
+from dynresp.experiments.mistakes import MAX_FILE_BYTES
+from dynresp.experiments.reading import parse_experiment, read_experiment
 from dynresp.experiments.values import Choice, Uniform
 from dynresp.paths import examples_folder
 

@@ -1,0 +1,109 @@
+"""`dynresp evaluate`: how well a classifier chooses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from dynresp.cli.options import Json
+from dynresp.cli.progress import progress
+
+
+def evaluate(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="File that `dynresp train` has written.")
+    ],
+    dataset: Annotated[
+        Path, typer.Argument(metavar="DATASET", help="Folder that `dynresp generate` has written.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder for evaluation.json, per_strategy.csv and confusion.png.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Judge a classifier by samples that it was not trained on, with baselines beside it.
+
+    Of the dataset that it was trained on, only the samples held out count; of any other, all.
+    """
+    from dynresp.cli.run import check_folder
+    from dynresp.cli.train import with_elapsed
+
+    if out is not None:
+        check_folder(out)
+    with progress() as told:
+        tell = with_elapsed(told)
+        tell("reading", 0, 1)
+        from dynresp.datasets.reading import load_dataset
+        from dynresp.experiments.result import to_json
+        from dynresp.learning import evaluate as judging
+        from dynresp.response.classifier_file import load_classifier
+
+        content = judging.evaluate(load_classifier(model), load_dataset(dataset), tell)
+        if out is not None:
+            tell("writing", 0, 1)
+            from dynresp.learning.report import write_report
+
+            written = write_report(out, content)
+    if content["differing_settings"]:
+        typer.echo(
+            "dynresp: the dataset was made under other settings than the classifier was trained "
+            f"for: {', '.join(content['differing_settings'])}",
+            err=True,
+        )
+    if as_json:
+        typer.echo(to_json(content))
+        return
+    typer.echo(_told(content))
+    if out is not None:
+        typer.echo(f"  written    {out}: {', '.join(written)}")
+
+
+def _told(content: dict[str, Any]) -> str:
+    from dynresp.cli.train import figures_told
+
+    model, dataset, left = content["model"], content["dataset"], content["left_out"]
+    which = "held-out samples" if content["held_out_only"] else "samples"
+    lines = [
+        f"{model['grouping']} of the library {dataset['library']!r}, trained on "
+        f"{model['trained_on']['samples']} samples",
+        f"  judged by  {content['samples']} {which} of {dataset['plan']!r}; left out: "
+        f"{left['nothing_hit']} in which nothing was hit, {left['features_missing']} with features "
+        f"missing, {left['not_held_out']} not held out",
+    ]
+    rows = {
+        "exact": content,
+        "reduced": content["reduced"],
+        **{name.replace("_", " "): row for name, row in content["baselines"].items()},
+    }
+    for name, row in rows.items():
+        if row is None:
+            lines.append(f"  {name}: needs the samples trained on, which are not in this dataset")
+            continue
+        as_one = row["mirrors_as_one"]
+        lines += [
+            f"  {name}",
+            f"    alone            {figures_told(row)}",
+            f"    grazes by rule   {figures_told(row['grazes_by_rule'])}",
+            f"    mirrors as one   accuracy {as_one['accuracy']:.1%}, two best "
+            f"{as_one['top2_accuracy']:.1%}; strategy {row['strategy_accuracy']:.1%}",
+        ]
+    lines.append(f"  reduced and exact agree in {content['reduced']['agreement']:.1%}")
+    for name, took in content["latency_us"].items():
+        lines.append(
+            f"  {name:<10} {took['alone']:.1f} us alone, {took['in_batch']:.1f} us each of a "
+            "thousand"
+        )
+    lines.append(f"  {'strategy':<26}{'samples':>9}{'accuracy':>10}{'two best':>10}{'regret':>9}")
+    for name, row in content["per_strategy"].items():
+        lines.append(
+            f"  {name:<26}{row['samples']:>9}{row['accuracy']:>10.1%}"
+            f"{row['top2_accuracy']:>10.1%}{row['regret']:>9.2%}"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,196 @@
+"""`dynresp train`: from a dataset to a classifier."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dynresp.cli.options import Json, Seed
+from dynresp.cli.progress import Tell, progress
+
+if TYPE_CHECKING:
+    from dynresp.response.classifier import Classifier
+
+# Where there is no terminal, a line that work goes on follows this often [s].
+_LINE_S = 20.0
+
+
+class Vector(StrEnum):
+    """The feature vectors."""
+
+    large = "large"
+    small = "small"
+
+
+class Grouping(StrEnum):
+    """What a class stands for."""
+
+    reactions = "reactions"
+    strategies = "strategies"
+
+
+def train(
+    dataset: Annotated[
+        Path, typer.Argument(metavar="DATASET", help="Folder that `dynresp generate` has written.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="MODEL",
+            help="The file, *.skops; by default where `dynresp run` finds it.",
+        ),
+    ] = None,
+    vector: Annotated[
+        Vector, typer.Option("--vector", help="All states of the bodies, or a few with balance.")
+    ] = Vector.large,
+    slices: Annotated[
+        str | None,
+        typer.Option(
+            "--slices",
+            metavar="S,S,...",
+            help="Times after contact to tell the states of, as 0,0.1,0.2,0.3; by default all.",
+        ),
+    ] = None,
+    classes: Annotated[
+        Grouping,
+        typer.Option("--classes", help="One class for each reaction, or for each strategy."),
+    ] = Grouping.reactions,
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", min=2, help="Train on so many samples at most."),
+    ] = None,
+    held_out: Annotated[
+        float,
+        typer.Option(
+            "--held-out", min=0.0, max=0.9, help="Share of the samples to judge by, not to train."
+        ),
+    ] = 0.1,
+    seed: Seed = None,
+    as_json: Json = False,
+) -> None:
+    """Train a classifier to choose as the oracle chose, and judge it by samples held out."""
+    from dynresp.cli.run import check_folder
+    from dynresp.errors import UsageError
+
+    if out is not None and (out.suffix != ".skops" or out.is_dir()):
+        raise UsageError(f"--out: {str(out)!r}: expected a file whose name ends in .skops")
+    if out is not None:
+        check_folder(out.parent)
+    with progress() as told:
+        tell = with_elapsed(told)
+        tell("reading", 0, 1)
+        from dynresp.datasets.reading import load_dataset
+        from dynresp.learning import train as learning
+        from dynresp.learning.split import Split
+        from dynresp.paths import classifier_file
+        from dynresp.response.classifier_file import save_classifier
+        from dynresp.response.features import SLICES_S
+
+        config = learning.TrainConfig(
+            vector=vector.value,
+            slices_s=SLICES_S if slices is None else _slices(slices),
+            grouping=classes.value,
+            samples=samples,
+            split=Split(seed or 0, held_out),
+        )
+        data = load_dataset(dataset)
+        file = out or classifier_file(data.facts.library_identity)
+        trained = learning.train(data, config, tell)
+        tell("writing", 0, 1)
+        save_classifier(file, trained.classifier, trained.pipelines)
+    if as_json:
+        typer.echo(json.dumps(_content(trained.classifier, file), indent=2))
+    else:
+        typer.echo(_told(trained.classifier, file))
+
+
+def with_elapsed(tell: Tell, clock: Callable[[], float] = time.monotonic) -> Tell:
+    """Adds the time that a stage has taken; where there is no terminal, only now and then.
+
+    Args:
+        tell: What to tell.
+        clock: Seconds that pass.
+    """
+    every = 0.0 if sys.stderr.isatty() else _LINE_S
+    stage, began, said_at = "", 0.0, 0.0
+
+    def told(now_in: str, done: int, of: int) -> None:
+        nonlocal stage, began, said_at
+        now = clock()
+        if now_in != stage:
+            stage, began, said_at = now_in, now, now
+            tell(stage, done, of)
+        elif now - said_at >= every:
+            said_at = now
+            tell(f"{stage}, {now - began:.0f} s", done, of)
+
+    return told
+
+
+def _slices(given: str) -> tuple[float, ...]:
+    from dynresp.errors import UsageError
+
+    try:
+        return tuple(float(part) for part in given.split(","))
+    except ValueError:
+        raise UsageError(
+            f"--slices: expected times in seconds, as 0,0.1,0.2,0.3, got {given!r}"
+        ) from None
+
+
+def _content(classifier: Classifier, file: Path) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return {
+        "file": str(file),
+        "grouping": classifier.grouping,
+        "classes": list(classifier.classes),
+        "absent": list(classifier.absent),
+        "trained_for": asdict(classifier.trained_for),
+        "trained_on": asdict(classifier.trained_on),
+        **classifier.facts,
+    }
+
+
+def _told(classifier: Classifier, file: Path) -> str:
+    facts, on = classifier.facts, classifier.trained_on
+    slices = ", ".join(f"{slice_s:g}" for slice_s in facts["slices_s"])
+    best = facts["models"]["exact"]
+    lines = [
+        f"trained on {on.samples} samples for the library {classifier.trained_for.library_name!r} "
+        f"in {facts['training_s']:.0f} s",
+        f"  left out   {facts['left_out']} samples without contact, diverged or incomplete",
+        f"  classes    {len(classifier.classes)} {classifier.grouping}",
+        f"  features   {len(classifier.feature_names)}, {facts['vector']}, at {slices} s",
+        f"  parameters C {best['penalty']:g}, gamma {best['gamma_factor']:g} of scale",
+    ]
+    if classifier.absent:
+        lines.append(f"  never seen {', '.join(classifier.absent)}")
+    for name, model in facts["models"].items():
+        lines.append(
+            f"  {name:<10} {model['components']} components, {model['support_vectors']} support "
+            "vectors"
+        )
+        held = model["held_out"]
+        if held is not None:
+            lines.append(f"    of {held['samples']} held out   {figures_told(held)}")
+            lines.append(f"    grazes by rule   {figures_told(held['grazes_by_rule'])}")
+    lines.append(f"  written    {file}")
+    return "\n".join(lines)
+
+
+def figures_told(figures: dict[str, Any]) -> str:
+    """Accuracy and regret in a line."""
+    return (
+        f"accuracy {figures['accuracy']:.1%}, two best {figures['top2_accuracy']:.1%}, "
+        f"within 1 % {figures['within_1_percent']:.1%}, regret {figures['regret']:.2%}, "
+        f"two best {figures['regret_top2']:.3%}"
+    )

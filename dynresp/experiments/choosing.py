@@ -1,0 +1,111 @@
+"""Which classifier an experiment chooses with, and what it does for want of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dynresp.experiments.settings import in_force
+from dynresp.experiments.spec import ChoiceTable
+from dynresp.motion.character import Character
+from dynresp.motion.library import BUILTIN, ReactionLibrary
+from dynresp.paths import classifier_file, expanded, models_folder
+from dynresp.response.budget import chooser_for
+from dynresp.response.choice import Chooser
+from dynresp.response.classifier import Classifier, TrainedFor
+from dynresp.response.classifier_file import load_classifier
+from dynresp.response.response import ResponseConfig
+
+
+@dataclass(frozen=True)
+class Choosing:
+    """What chooses in an experiment.
+
+    Attributes:
+        chooser: It.
+        about: What `result.json` says of it.
+    """
+
+    chooser: Chooser
+    about: dict[str, Any]
+
+
+def take_chooser(
+    table: ChoiceTable,
+    character: Character,
+    library: ReactionLibrary,
+    config: ResponseConfig,
+    beside: Path,
+) -> Choosing:
+    """Make what an experiment asks for.
+
+    For want of a classifier for the library, the oracle chooses.
+
+    Args:
+        table: The experiment's `[choice]`.
+        character: The character.
+        library: Its reactions.
+        config: Settings.
+        beside: Folder of the experiment file, from which a relative path counts.
+
+    Raises:
+        ClassifierError: A classifier's file is damaged, or it was trained for something else.
+        MotionError: A clip of the library is shorter than a window.
+    """
+    budget = table.budget
+    about: dict[str, Any] = {"budget": budget}
+    classifier = None
+    if budget != "best":
+        named = None if table.classifier is None else beside / expanded(table.classifier, "choice")
+        classifier = find_classifier(library, character, named)
+        if classifier is None:
+            about = {"budget": "best", "instead_of": budget}
+            budget = "best"
+    if classifier is not None:
+        about["classifier"] = _about(classifier, config)
+    return Choosing(chooser_for(budget, character, library, config, classifier), about)
+
+
+def find_classifier(
+    library: ReactionLibrary, character: Character, named: Path | None = None
+) -> Classifier | None:
+    """The classifier for a library: a named one, this user's own, or the one that is shipped.
+
+    Args:
+        library: The reactions.
+        character: Their character.
+        named: File that the user named.
+
+    Returns:
+        None where none is named and there is none.
+
+    Raises:
+        ClassifierError: The file is damaged, or was trained for something else.
+    """
+    places = [named] if named is not None else [classifier_file(library.identity)]
+    if named is None and library.name == BUILTIN:
+        places.append(shipped_classifier())
+    for place in places:
+        if place == named or place.is_file():
+            classifier = load_classifier(place)
+            classifier.check(TrainedFor.of(library, character))
+            return classifier
+    return None
+
+
+def shipped_classifier() -> Path:
+    """The file of the classifier for the built-in library."""
+    return models_folder() / "builtin.skops"
+
+
+def _about(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "classes": len(classifier.classes),
+        "features": len(classifier.feature_names),
+        "trained_on": classifier.trained_on.samples,
+        "dataset": classifier.trained_on.dataset,
+    }
+    # Trained with other settings it predicts what the oracle would have chosen with those.
+    differing = classifier.differing_settings(in_force(config))
+    return {**told, "other_settings": differing} if differing else told

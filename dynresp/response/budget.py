@@ -1,0 +1,53 @@
+"""How much is spent on a choice."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias, get_args
+
+from dynresp.errors import UsageError
+from dynresp.motion.character import Character
+from dynresp.motion.library import ReactionLibrary
+from dynresp.response.choice import Chooser
+from dynresp.response.classifier import Classifier
+from dynresp.response.classifier_choice import ClassifierChooser
+from dynresp.response.oracle_choice import OracleChooser
+from dynresp.response.response import ResponseConfig
+
+Budget: TypeAlias = Literal["fast", "better", "best"]
+BUDGETS: tuple[str, ...] = get_args(Budget)
+"""What the classifier takes to be best is aligned; the best two of what it predicts are aligned,
+and the better one is taken; the oracle searches everything."""
+
+_ALIGNED = {"fast": 1, "better": 2}
+
+
+def chooser_for(
+    budget: str,
+    character: Character,
+    library: ReactionLibrary,
+    config: ResponseConfig,
+    classifier: Classifier | None = None,
+) -> Chooser:
+    """What chooses with a budget.
+
+    Args:
+        budget: One of `BUDGETS`.
+        character: The character.
+        library: Its reactions.
+        config: Settings.
+        classifier: Trained for them; "best" needs none.
+
+    Raises:
+        UsageError: There is no such budget, or it needs a classifier.
+        ClassifierError: The classifier was trained for something else.
+        MotionError: A clip is shorter than a window.
+    """
+    if budget not in BUDGETS:
+        raise UsageError(f"the budget is one of {', '.join(BUDGETS)}, got {budget!r}")
+    if budget == "best":
+        return OracleChooser(character, library, config)
+    if classifier is None:
+        raise UsageError(
+            f"the budget {budget!r} needs a trained classifier; give one, or take the budget 'best'"
+        )
+    return ClassifierChooser(character, library, config, classifier, best=_ALIGNED[budget])
