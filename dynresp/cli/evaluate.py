@@ -89,8 +89,8 @@ def _told(content: dict[str, Any]) -> str:
         as_one = row["mirrors_as_one"]
         lines += [
             f"  {name}",
-            f"    alone            {figures_told(row)}",
-            f"    grazes by rule   {figures_told(row['grazes_by_rule'])}",
+            f"    in use           {figures_told(row)}",
+            f"    alone            {figures_told(row['alone'])}",
             f"    mirrors as one   accuracy {as_one['accuracy']:.1%}, two best "
             f"{as_one['top2_accuracy']:.1%}; strategy {row['strategy_accuracy']:.1%}",
         ]

@@ -181,8 +181,8 @@ def _told(classifier: Classifier, file: Path) -> str:
         )
         held = model["held_out"]
         if held is not None:
-            lines.append(f"    of {held['samples']} held out   {figures_told(held)}")
-            lines.append(f"    grazes by rule   {figures_told(held['grazes_by_rule'])}")
+            lines.append(f"    of {held['samples']} held out, in use   {figures_told(held)}")
+            lines.append(f"    alone            {figures_told(held['alone'])}")
     lines.append(f"  written    {file}")
     return "\n".join(lines)
 

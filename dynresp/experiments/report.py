@@ -128,6 +128,7 @@ def _write_alignment(
     assert response.entry is not None
     fps = response.motion.fps
     found = landscape(response, character, config)
+    ranking = [RankedReaction(name, error) for name, error in response.errors.items()]
     write_alignment(
         path,
         found.errors,
@@ -137,7 +138,8 @@ def _write_alignment(
         response.entry / fps,
         title=f"{title}: {spoken(response.choice)}",
         unit="m",
-        ranking=[RankedReaction(name, error) for name, error in response.errors.items()],
+        # Where one reaction alone was aligned there is nothing to compare it with.
+        ranking=ranking if len(ranking) > 1 else [],
         chosen_name=response.choice,
     )
 

@@ -14,7 +14,7 @@ from dynresp.learning.baselines import at_random, most_frequent, nearest_neighbo
 from dynresp.learning.figures import (
     Choices,
     confusion,
-    decide_grazes,
+    in_use,
     measure,
     merge_mirrors,
 )
@@ -56,8 +56,9 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
     learning, judged = _parted(classifier, dataset, usable)
 
     progress("predicting", 0, 1)
-    exact = known[classifier.exact.rank(judged.features, 2)]
-    reduced = known[classifier.reduced.rank(judged.features, 2)]
+    most = min(3, len(classifier.classes))
+    exact = known[classifier.exact.rank(judged.features, most)]
+    reduced = known[classifier.reduced.rank(judged.features, most)]
     progress("comparing", 0, 1)
     baselines = _baselines(classifier, groups, known, learning, judged)
     progress("measuring", 0, 1)
@@ -86,10 +87,12 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
             "agreement": float(np.mean(exact[:, 0] == reduced[:, 0])),
         },
         "baselines": baselines,
-        "per_strategy": _per_strategy(exact, judged, groups),
+        "per_strategy": _per_strategy(_in_use(exact, judged, groups), judged, groups),
         "confusion": {
             "classes": list(groups.names),
-            "counts": confusion(exact[:, 0], judged.labels, len(groups.names)).tolist(),
+            "counts": confusion(
+                _in_use(exact, judged, groups)[:, 0], judged.labels, len(groups.names)
+            ).tolist(),
         },
         "latency_us": latency,
     }
@@ -124,23 +127,25 @@ def _parted(
 
 
 def _figures(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, Any]:
-    """Figures of choices: alone, with grazes decided by rule, and with mirror images as one."""
-    ruled = decide_grazes(ranked, judged.grazes, groups.carry_on)
-    as_one = _mirrors_as_one(ranked, judged, groups)
+    """Figures of choices as the responder makes them, and of the predictions alone."""
+    used = _in_use(ranked, judged, groups)
+    return {**_measured(used, judged, groups), "alone": _measured(ranked, judged, groups)}
+
+
+def _in_use(ranked: Choices, judged: Labelled, groups: Groups) -> Choices:
+    return in_use(ranked, judged.errors, judged.grazes, groups.carry_on, judged.carry_on_limit)
+
+
+def _measured(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, Any]:
     return {
         **measure(ranked, judged.labels, judged.errors).to_json(),
         "strategy_accuracy": _strategy_accuracy(ranked, judged, groups),
-        "mirrors_as_one": as_one,
-        "grazes_by_rule": {
-            **measure(ruled, judged.labels, judged.errors).to_json(),
-            "strategy_accuracy": _strategy_accuracy(ruled, judged, groups),
-            "mirrors_as_one": _mirrors_as_one(ruled, judged, groups),
-        },
+        "mirrors_as_one": _mirrors_as_one(ranked, judged, groups),
     }
 
 
 def _mirrors_as_one(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, float]:
-    merged = merge_mirrors(ranked, groups.mirrors)
+    merged = merge_mirrors(ranked[:, :2], groups.mirrors)
     right = merged == merge_mirrors(judged.labels, groups.mirrors)[:, None]
     return {
         "accuracy": float(right[:, 0].mean()),

@@ -89,25 +89,40 @@ def regrets(chosen: npt.NDArray[np.integer], labels: Choices, errors: FloatArray
     return np.asarray(np.maximum(errors[rows, chosen] / least - 1.0, 0.0))
 
 
-def decide_grazes(
-    ranked: npt.NDArray[np.integer], grazes: npt.NDArray[np.bool_], carry_on: int
+def in_use(
+    ranked: npt.NDArray[np.integer],
+    errors: FloatArray,
+    grazes: npt.NDArray[np.bool_],
+    carry_on: int,
+    limit: float,
 ) -> Choices:
-    """Choices where grazes are decided by rule: the base motion goes on, whatever was predicted.
+    """Choices as the responder makes them with a classifier (`classifier_choice`).
 
-    A responder knows a graze from the simulation, as the oracle does.
+    Whether the base motion is carried on it measures, as the oracle does: after a graze always, and
+    else where it fits well enough and better than the reaction that was predicted. So of what was
+    predicted only the order of the reactions counts.
 
     Args:
         ranked: (n, 2 or more) classes, the best first.
+        errors: (n, classes) window errors [m].
         grazes: (n,) which hits were grazes.
         carry_on: The class to carry on.
+        limit: Largest error with which the base motion is carried on [m].
 
     Returns:
-        (n, 2): of a graze first to carry on, then the best of the rest.
+        (n, 2): the choice, and the best of what else would be aligned were there time for one
+        more reaction.
     """
-    two = np.array(ranked[:, :2], dtype=np.intp)
-    rest = np.where(two[:, 0] == carry_on, two[:, 1], two[:, 0])
-    two[grazes] = np.stack([np.full(len(two), carry_on), rest], axis=1)[grazes]
-    return two
+    rows = np.arange(len(ranked))
+    # A stable sort by "is to carry on" brings the reactions to the front, in their order.
+    order = np.argsort(ranked == carry_on, axis=1, kind="stable")
+    reactions = np.take_along_axis(np.asarray(ranked, dtype=np.intp), order, axis=1)[:, :2]
+    first, other = reactions.T
+    stays = errors[:, carry_on] <= np.minimum(errors[rows, first], limit)
+    stays |= grazes | (first == carry_on)
+    better = np.where(errors[rows, other] < errors[rows, first], other, first)
+    second = np.where(better == carry_on, first, better)
+    return np.stack([np.where(stays, carry_on, first), np.where(stays, second, other)], axis=1)
 
 
 def merge_mirrors(classes: npt.NDArray[np.integer], mirrors: Choices) -> Choices:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.learning.figures import Figures, decide_grazes, measure
+from dynresp.learning.figures import Figures, in_use, measure
 from dynresp.learning.labelled import Labelled
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.prediction import PairwiseQuadratic
@@ -58,7 +58,7 @@ class Tried:
 
     Attributes:
         parameters: The parameters.
-        figures: Over all folds, grazes decided by rule.
+        figures: Over all folds, of the choices as the responder makes them.
     """
 
     parameters: Parameters
@@ -148,7 +148,8 @@ def cross_validate(
         What was found of each, in the order given.
     """
     count = int(folds.max()) + 1
-    ranked = {parameters: np.zeros((len(samples), 2), np.intp) for parameters in grid}
+    most = min(3, len(np.unique(samples.labels)))
+    ranked = {parameters: np.zeros((len(samples), most), np.intp) for parameters in grid}
     of, done, stage = count * len(grid), 0, f"trying parameters on {len(samples)} samples"
     for fold, components in product(range(count), dict.fromkeys(p.components for p in grid)):
         inside, outside = folds != fold, folds == fold
@@ -159,13 +160,17 @@ def cross_validate(
             progress(stage, done, of)
             pipeline = _fit_machine(ahead, reduced, samples.labels[inside], parameters)
             predictor = PairwiseQuadratic.from_pipeline(pipeline)
-            best = predictor.rank(samples.features[outside], 2)
+            best = predictor.rank(samples.features[outside], min(most, predictor.classes))
+            # Where a fold lacks a class there can be one less to rank.
+            best = np.pad(best, ((0, 0), (0, most - best.shape[1])), mode="edge")
             ranked[parameters][outside] = pipeline.classes_[best]
             done += 1
     progress(stage, of, of)
     tried = []
     for parameters in grid:
-        choices = decide_grazes(ranked[parameters], samples.grazes, carry_on)
+        choices = in_use(
+            ranked[parameters], samples.errors, samples.grazes, carry_on, samples.carry_on_limit
+        )
         tried.append(Tried(parameters, measure(choices, samples.labels, samples.errors)))
     return tried
 

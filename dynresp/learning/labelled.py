@@ -25,6 +25,8 @@ class Labelled:
         labels: (n,) classes.
         errors: (n, classes) window errors [m].
         grazes: (n,) which hits were grazes.
+        carry_on_limit: Largest window error with which the base motion is carried on after a hit
+            that was no graze [m].
     """
 
     index: npt.NDArray[np.int64]
@@ -32,6 +34,7 @@ class Labelled:
     labels: Choices
     errors: FloatArray
     grazes: npt.NDArray[np.bool_]
+    carry_on_limit: float
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -45,6 +48,7 @@ class Labelled:
             self.labels[rows],
             self.errors[rows],
             self.grazes[rows],
+            self.carry_on_limit,
         )
 
 
@@ -89,4 +93,5 @@ def labelled(dataset: Dataset, groups: Groups, columns: npt.NDArray[np.intp]) ->
         labels=groups.labels(dataset.label[rows]),
         errors=groups.errors(dataset.errors[rows]),
         grazes=dataset.graze[rows],
+        carry_on_limit=float(dataset.facts.settings["carry_on_max_error_m"]),
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from dynresp.datasets.reading import Dataset
 from dynresp.errors import UnknownNameError, UsageError
-from dynresp.learning.figures import decide_grazes, measure
+from dynresp.learning.figures import in_use, measure
 from dynresp.learning.fitting import (
     Parameters,
     Progress,
@@ -65,7 +65,7 @@ class TrainConfig:
     components: tuple[int, ...] = (40, 64, 100)
     penalties: tuple[float, ...] = (1.0, 10.0, 100.0)
     gamma_factors: tuple[float, ...] = (0.5, 1.0)
-    reduced_components: int = 24
+    reduced_components: int = 32
     folds: int = 3
     searched_samples: int = 6_000
     finalists: int = 4
@@ -225,11 +225,12 @@ class _Model:
         """Figures on samples that were held out; None where there are none."""
         if not len(samples):
             return None
-        ranked = self.pipeline.classes_[self.predictor.rank(samples.features, 2)]
-        ruled = decide_grazes(ranked, samples.grazes, carry_on)
+        most = min(3, self.predictor.classes)
+        ranked = self.pipeline.classes_[self.predictor.rank(samples.features, most)]
+        used = in_use(ranked, samples.errors, samples.grazes, carry_on, samples.carry_on_limit)
         return {
-            **measure(ranked, samples.labels, samples.errors).to_json(),
-            "grazes_by_rule": measure(ruled, samples.labels, samples.errors).to_json(),
+            **measure(used, samples.labels, samples.errors).to_json(),
+            "alone": measure(ranked, samples.labels, samples.errors).to_json(),
         }
 
 

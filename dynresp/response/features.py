@@ -8,6 +8,7 @@ below its pelvis, X points where the pelvis faced (`windows.facing_frames`), Z p
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Sequence
 from typing import Literal, TypeAlias, get_args
@@ -16,9 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import MotionError, UsageError
-from dynresp.motion import rotations
-from dynresp.motion.body_velocities import body_velocities
-from dynresp.motion.character import POSE_SIZE, ROOT_QUAT, VELOCITY_SIZE, Character
+from dynresp.motion.character import POSE_SIZE, VELOCITY_SIZE, Character
 from dynresp.motion.rotations import FloatArray
 
 SLICES_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
@@ -125,38 +124,30 @@ def extract(
             f"expected poses (hits, frames, {POSE_SIZE}) and velocities (hits, frames, "
             f"{VELOCITY_SIZE}) of at least one frame, got {pose.shape} and {rate.shape}"
         )
+    # Numba takes a third of a second to import, the kernel a second more when first compiled.
+    from dynresp.response.features_kernel import features_kernel
+
     frames = slice_frames(fps)
     seen = frames[frames < pose.shape[1]]
-    hits = len(pose)
-    states = character.kinematics(pose[:, seen].reshape(-1, POSE_SIZE))
-    moving = body_velocities(character, states, rate[:, seen].reshape(-1, VELOCITY_SIZE))
-    turn = rotations.from_yaw(-rotations.yaw_of(pose[:, 0, ROOT_QUAT]))[:, None, None]
-    origin = pose[:, 0, :3] * (1.0, 1.0, 0.0)
-
-    def per_hit(array: FloatArray) -> FloatArray:
-        return array.reshape(hits, len(seen), *array.shape[1:])
-
-    share = (character.masses / character.masses.sum())[:, None]
-    chosen = [character.body(name) for name in BODIES]
-    centers = rotations.rotate(turn, per_hit(states.centers) - origin[:, None, None])
-    speeds = rotations.rotate(turn, per_hit(moving.centers))
-    quaternions = rotations.multiply(turn, per_hit(states.quaternions[:, chosen]))
-    bodies = np.stack(
-        [
-            centers[:, :, chosen],
-            rotations.to_rotation_vector(quaternions),
-            speeds[:, :, chosen],
-            rotations.rotate(turn, per_hit(moving.angular[:, chosen])),
-        ],
-        axis=3,
+    features = np.full((len(pose), len(FEATURE_NAMES)), np.nan, dtype=np.float32)
+    features_kernel(
+        np.ascontiguousarray(pose), np.ascontiguousarray(rate), seen, *_body(character), features
     )
-    # Summed body by body, not by a matrix product, whose bits depend on how many hits there are.
-    com = np.stack([np.sum(share * part, axis=2) for part in (centers, speeds)], axis=2)
-    both = (bodies.reshape(hits, len(seen), -1), com.reshape(hits, len(seen), -1))
-    found = np.concatenate(both, axis=2).reshape(hits, -1)
-    features = np.full((hits, len(FEATURE_NAMES)), np.nan, dtype=np.float32)
-    features[:, : found.shape[1]] = found
     return features
+
+
+@functools.lru_cache(maxsize=4)
+def _body(
+    character: Character,
+) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray, FloatArray, npt.NDArray[np.intp]]:
+    """What the kernel needs of a character: parents, offsets, centres, shares, bodies told of."""
+    return (
+        character.parents.astype(np.int64),
+        np.ascontiguousarray(character.offsets),
+        np.ascontiguousarray(character.model.body_ipos[1:]),
+        character.masses / character.masses.sum(),
+        np.array([character.body(name) for name in BODIES], np.int64),
+    )
 
 
 def vector_columns(

@@ -23,6 +23,7 @@ _CENTRES = np.array(
 SETTINGS: dict[str, Any] = {
     "window_s": 1 / 3,
     "blend_s": 0.33,
+    "carry_on_max_error_m": 100.0,
     "fixed": {"fps": 30.0, "position_weight": [1.0, 2.0]},
 }
 

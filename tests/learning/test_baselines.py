@@ -18,6 +18,7 @@ def labelled(rng: np.random.Generator, samples: int) -> Labelled:
         labels=rng.integers(3, size=samples),
         errors=np.ones((samples, 4)),
         grazes=np.zeros(samples, bool),
+        carry_on_limit=1.5,
     )
 
 

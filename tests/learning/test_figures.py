@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from dynresp.errors import UsageError
 from dynresp.learning.figures import (
     confusion,
-    decide_grazes,
+    in_use,
     measure,
     merge_mirrors,
     regrets,
@@ -37,11 +37,11 @@ def test_figures_are_those_of_a_plain_loop(seed: int) -> None:
 
 
 @given(SEEDS)
-def test_a_graze_is_carried_on_and_the_others_stay(seed: int) -> None:
-    ranked, _, _, grazes = judged(seed)
-    found = decide_grazes(ranked, grazes, 1)
-    assert found.tolist() == slow.decide_grazes(ranked, grazes, 1)
-    assert (found[:, 0] != found[:, 1]).all()
+def test_in_use_carrying_on_is_measured(seed: int) -> None:
+    ranked, _, errors, grazes = judged(seed)
+    found = in_use(ranked, errors, grazes, 1, 0.6)
+    assert found.tolist() == slow.in_use(ranked, errors, grazes, 1, 0.6)
+    assert (found[grazes, 0] == 1).all()
 
 
 @given(SEEDS)

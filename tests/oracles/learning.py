@@ -33,14 +33,24 @@ def figures(
     }
 
 
-def decide_grazes(
-    ranked: npt.NDArray[Any], grazes: npt.NDArray[Any], carry_on: int
+def in_use(
+    ranked: npt.NDArray[Any],
+    errors: npt.NDArray[Any],
+    grazes: npt.NDArray[Any],
+    carry_on: int,
+    limit: float,
 ) -> list[list[int]]:
-    """What `dynresp.learning.figures.decide_grazes` says."""
+    """What `dynresp.learning.figures.in_use` says."""
     found = []
-    for row, graze in zip(ranked, grazes, strict=True):
-        rest = [int(choice) for choice in row[:2] if choice != carry_on]
-        found.append([carry_on, rest[0]] if graze else [int(row[0]), int(row[1])])
+    for row, error, graze in zip(ranked, errors, grazes, strict=True):
+        reactions = [int(choice) for choice in row if choice != carry_on]
+        one = reactions[0]
+        two = reactions[1] if len(reactions) > 1 else None
+        if graze or error[carry_on] <= min(error[one], limit):
+            better = two if two is not None and error[two] < error[one] else one
+            found.append([carry_on, better])
+        else:
+            found.append([one, carry_on if two is None else two])
     return found
 
 

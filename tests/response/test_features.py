@@ -1,5 +1,6 @@
 """Features of hits: against their twin, and what must not matter to them."""
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +12,7 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import move_poses
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.features import (
+    BODIES,
     FEATURE_NAMES,
     PAPER_SLICES_S,
     SLICES_S,
@@ -45,6 +47,23 @@ def test_they_are_their_twins(seed: int) -> None:
         expected = twin.slices(character, poses[hit], velocities[hit], [0, 3, 6, 9, 12, 15])
         # The twin finds the facing by a search of its own, to about 1e-4.
         np.testing.assert_allclose(ours[hit], expected, atol=2e-3)
+
+
+def test_velocities_are_mujocos(character: Character) -> None:
+    poses, velocities = _hits(3, hits=1, frames=1)
+    poses[0, 0, :7] = [0.3, -0.2, 1.0, 1.0, 0.0, 0.0, 0.0]
+    told = dict(zip(FEATURE_NAMES, extract(character, poses, velocities, FPS)[0], strict=True))
+    data = mujoco.MjData(character.model)
+    data.qpos, data.qvel = poses[0, 0], velocities[0, 0]
+    mujoco.mj_forward(character.model, data)
+    both = np.empty(6)
+    for name in BODIES:
+        # Angular first, then linear of the centre of mass, in axes of the world.
+        kind, body = mujoco.mjtObj.mjOBJ_BODY, character.body(name) + 1
+        mujoco.mj_objectVelocity(character.model, data, kind, body, both, 0)
+        for k, axis in enumerate("xyz"):
+            assert told[f"0.0/{name}/angular_velocity_{axis}"] == pytest.approx(both[k], abs=1e-5)
+            assert told[f"0.0/{name}/velocity_{axis}"] == pytest.approx(both[3 + k], abs=1e-5)
 
 
 @settings(max_examples=15, deadline=None)
