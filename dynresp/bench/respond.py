@@ -91,7 +91,11 @@ def run(
         key = name.replace(", ", "_").replace(" ", "_")
         more[f"{key}_ms"] = 1e3 * float(np.median(seconds))
         more[f"{key}_p95_ms"] = 1e3 * float(np.percentile(seconds, 95))
-    more |= {f"{name}_ms": 1e3 * value for name, value in _stages(loaded, trained, hits).items()}
+    stages = _stages(loaded, trained, hits)
+    more |= {f"{name}_ms": 1e3 * value for name, value in stages.items()}
+    predicted = stages["stage_predict_reduced"] + stages["stage_align"]
+    more["oracle_over_prediction_and_alignment"] = stages["stage_oracle"] / predicted
+    more["oracle_over_whole_choice"] = stages["stage_oracle"] / stages["stage_choice"]
     fast = 1e3 * times["fast"]
     return BenchResult(
         name="respond",
@@ -112,6 +116,7 @@ def run(
         notes=(
             f"one core; a 60 Hz frame is {FRAME_MS:.1f} ms",
             "with a second pass the rest of the simulation is made in the same frame, too",
+            "stage_choice: features, prediction, the base motion's fit, alignment, with all Python",
         ),
     )
 
@@ -142,6 +147,8 @@ def _stages(loaded: Run, classifier: Classifier, hits: int) -> dict[str, float]:
     config, character = loaded.config, loaded.character
     stage = HitStage(character, config, 1)
     aligner = Aligner(reaction_tracks(character, loaded.library, config), config.window)
+    fast = chooser_for("fast", character, loaded.library, config, classifier)
+    oracle = chooser_for("best", character, loaded.library, config)
     seconds: dict[str, list[float]] = {}
 
     def timed(name: str, call: Callable[[], Any]) -> Any:
@@ -170,7 +177,10 @@ def _stages(loaded: Run, classifier: Classifier, hits: int) -> dict[str, float]:
             "features", functools.partial(extract, character, seen.poses, seen.velocities, fps)
         )
         timed("predict", functools.partial(classifier.rank, features))
+        timed("predict_reduced", functools.partial(classifier.rank, features, reduced=True))
         trace = seen.states.centers[0], seen.states.quaternions[0]
         timed("align", functools.partial(aligner.align, *trace, aligner.names[:1]))
+        timed("choice", functools.partial(fast.choose, seen))
+        timed("oracle", functools.partial(oracle.choose, seen))
         timed("rewind", functools.partial(simulation.rewind, 0, contact.frame))
     return {name: float(np.median(values)) for name, values in seconds.items()}

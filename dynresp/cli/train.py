@@ -73,6 +73,13 @@ def train(
             "--held-out", min=0.0, max=0.9, help="Share of the samples to judge by, not to train."
         ),
     ] = 0.1,
+    compiled_only: Annotated[
+        bool,
+        typer.Option(
+            "--compiled-only",
+            help="Leave out the scikit-learn pipelines, and with them all training samples.",
+        ),
+    ] = False,
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
@@ -105,7 +112,8 @@ def train(
         file = out or classifier_file(data.facts.library_identity)
         trained = learning.train(data, config, tell)
         tell("writing", 0, 1)
-        save_classifier(file, trained.classifier, trained.pipelines)
+        pipelines = None if compiled_only else trained.pipelines
+        save_classifier(file, trained.classifier, pipelines)
     if as_json:
         typer.echo(json.dumps(_content(trained.classifier, file), indent=2))
     else:

@@ -9,13 +9,16 @@ from typing import Any
 from dynresp.experiments.settings import in_force
 from dynresp.experiments.spec import ChoiceTable
 from dynresp.motion.character import Character
-from dynresp.motion.library import BUILTIN, ReactionLibrary
+from dynresp.motion.library import BUILTIN, RECORDED, ReactionLibrary
 from dynresp.paths import classifier_file, expanded, models_folder
 from dynresp.response.budget import chooser_for
 from dynresp.response.choice import Chooser
 from dynresp.response.classifier import Classifier, TrainedFor
 from dynresp.response.classifier_file import load_classifier
 from dynresp.response.response import ResponseConfig
+
+SHIPPED = (BUILTIN, *RECORDED)
+"""Names of the libraries for which a classifier is shipped."""
 
 
 @dataclass(frozen=True)
@@ -83,20 +86,26 @@ def find_classifier(
     Raises:
         ClassifierError: The file is damaged, or was trained for something else.
     """
-    places = [named] if named is not None else [classifier_file(library.identity)]
-    if named is None and library.name == BUILTIN:
-        places.append(shipped_classifier())
-    for place in places:
-        if place == named or place.is_file():
-            classifier = load_classifier(place)
-            classifier.check(TrainedFor.of(library, character))
-            return classifier
-    return None
+    own = TrainedFor.of(library, character)
+    kept = classifier_file(library.identity)
+    if named is not None or kept.is_file():
+        classifier = load_classifier(named or kept)
+        classifier.check(own)
+        return classifier
+    if library.name not in SHIPPED:
+        return None
+    shipped = load_classifier(shipped_classifier(library.name))
+    # Another library may bear the name of one of ours.
+    return shipped if shipped.trained_for == own else None
 
 
-def shipped_classifier() -> Path:
-    """The file of the classifier for the built-in library."""
-    return models_folder() / "builtin.skops"
+def shipped_classifier(library: str) -> Path:
+    """The file of the classifier that is shipped for a library.
+
+    Args:
+        library: One of `SHIPPED`.
+    """
+    return models_folder() / f"{library}.skops"
 
 
 def _about(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:

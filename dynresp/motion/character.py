@@ -100,7 +100,7 @@ class Character:
         self._mirror_joints = _mirror_permutation(self.joint_names)
         self.rest_pose = _frozen(self.model.qpos0)
         self._center_offsets = self.model.body_ipos[1:].copy()
-        self._levels = _levels(self.parents)
+        self._parents = self.parents.astype(np.int64)
         self.identity = hashlib.sha256(_contents(self.model)).hexdigest()[:16]
 
     def body(self, name: str) -> int:
@@ -137,21 +137,17 @@ class Character:
         Raises:
             MotionError: The poses have another width.
         """
-        poses = as_poses(poses)
-        frames, bodies = len(poses), len(self.body_names)
-        # Joint i moves body i + 1; the root moves body 0.
-        local = poses[:, 3:].reshape(frames, bodies, 4)
-        positions = np.empty((frames, bodies, 3))
-        quaternions = np.empty((frames, bodies, 4))
-        positions[:, 0], quaternions[:, 0] = poses[:, ROOT], local[:, 0]
-        for level in self._levels:
-            parent = self.parents[level]
-            quaternions[:, level] = rotations.multiply(quaternions[:, parent], local[:, level])
-            positions[:, level] = positions[:, parent] + rotations.rotate(
-                quaternions[:, parent], self.offsets[level]
-            )
-        centers = positions + rotations.rotate(quaternions, self._center_offsets)
-        return BodyStates(positions, quaternions, centers)
+        # Numba takes a third of a second to import, the kernel a second when first compiled.
+        from dynresp.motion.kinematics_kernel import kinematics_kernel
+
+        poses = np.ascontiguousarray(as_poses(poses))
+        shape = (len(poses), len(self.body_names))
+        states = BodyStates(np.empty((*shape, 3)), np.empty((*shape, 4)), np.empty((*shape, 3)))
+        kinematics_kernel(
+            poses, self._parents, self.offsets, self._center_offsets,
+            states.positions, states.quaternions, states.centers,
+        )  # fmt: skip
+        return states
 
     def local_rotations(self, quaternions: npt.ArrayLike) -> FloatArray:
         """Joint quaternions from the orientations of all bodies.
@@ -216,14 +212,6 @@ def _mirror_permutation(names: tuple[str, ...]) -> npt.NDArray[np.intp]:
         return name
 
     return np.array([names.index(other(name)) for name in names])
-
-
-def _levels(parents: npt.NDArray[np.intp]) -> list[list[int]]:
-    """Bodies by depth below the root, so that a whole depth is computed at once."""
-    depth = [0] * len(parents)
-    for i in range(1, len(parents)):
-        depth[i] = depth[parents[i]] + 1
-    return [[i for i, d in enumerate(depth) if d == level] for level in range(1, max(depth) + 1)]
 
 
 def _check_layout(file: Path, model: mujoco.MjModel) -> None:

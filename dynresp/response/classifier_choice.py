@@ -12,12 +12,11 @@ from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.response.alignment import Aligner, AlignmentConfig
 from dynresp.response.alignment_result import Alignment
-from dynresp.response.carry_on import search_base_motions
+from dynresp.response.carry_on import BaseFit, align_base_motions
 from dynresp.response.choice import Choice
 from dynresp.response.classifier import Classifier, TrainedFor
 from dynresp.response.features import extract
 from dynresp.response.look_ahead import LookAhead
-from dynresp.response.oracle import OracleResult
 from dynresp.response.oracle_choice import reaction_tracks
 from dynresp.response.response import CARRY_ON, ResponseConfig
 
@@ -80,10 +79,10 @@ class ClassifierChooser:
         fps = self.config.physics.fps
         features = extract(self.character, hits.poses, hits.velocities, fps)
         ranked = self.classifier.rank(features, self._asked, reduced=self._reduced)
-        found = search_base_motions(self.character, self.config, hits, range(len(hits)))
+        fits = align_base_motions(self.character, self.config, hits)
         return [
-            self._choose(hits, row, self._reactions(ranked[row]), *found[row])
-            for row in range(len(hits))
+            self._choose(hits, row, self._reactions(ranked[row]), fit)
+            for row, fit in enumerate(fits)
         ]
 
     def _reactions(self, ranked: npt.NDArray[np.int64]) -> list[str]:
@@ -92,22 +91,17 @@ class ClassifierChooser:
         classes = [own for own in members if CARRY_ON not in own][: self._best]
         return [name for own in classes for name in own]
 
-    def _choose(
-        self, hits: LookAhead, row: int, names: list[str], stay: OracleResult, stay_entry: int
-    ) -> Choice:
+    def _choose(self, hits: LookAhead, row: int, names: list[str], stay: BaseFit) -> Choice:
         """To carry on, or the best of what was predicted."""
-        carried = stay.best
-        errors = {CARRY_ON: carried.error}
-        carry_on = Choice(
-            CARRY_ON, hits.bases[row], carried.exit_frame, stay_entry, carried.error, errors
-        )
+        errors = {CARRY_ON: stay.error}
+        carry_on = Choice(CARRY_ON, hits.bases[row], stay.exit, stay.entry, stay.error, errors)
         if hits.grazes[row] or not names:
             return carry_on
         trace = hits.states.centers[row], hits.states.quaternions[row]
         aligned = self._aligner.align(*trace, names)
         errors |= {alignment.reaction: alignment.error for alignment in aligned}
         best = min(aligned, key=lambda alignment: alignment.error)
-        if carried.error <= min(best.error, self.config.carry_on_max_error):
+        if stay.error <= min(best.error, self.config.carry_on_max_error):
             return carry_on
         return self._enter(self._aligner.snap(*trace, best), errors)
 

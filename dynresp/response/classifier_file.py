@@ -16,7 +16,8 @@ member                      what it holds
 
 So `skops.io.load` opens it as any other, while the responder reads arrays alone, in milliseconds
 where importing scikit-learn and skops takes two seconds. Nothing is ever unpickled. The two halves
-are written together and never changed; each member has its checksum.
+are written together and never changed; each member has its checksum. The pipelines can be left out:
+their support vectors are training samples, which not everyone may pass on, and most of the file.
 """
 
 from __future__ import annotations
@@ -79,21 +80,24 @@ _TRUSTED = {
 
 
 def save_classifier(
-    path: Path | str, classifier: Classifier, pipelines: Mapping[str, Pipeline]
+    path: Path | str, classifier: Classifier, pipelines: Mapping[str, Pipeline] | None
 ) -> None:
     """Write a classifier.
 
     Args:
         path: The file; missing folders are made.
         classifier: The classifier.
-        pipelines: The scikit-learn pipelines that it was compiled from, "exact" and "reduced".
+        pipelines: The scikit-learn pipelines that it was compiled from, "exact" and "reduced";
+            None leaves them out.
 
     Raises:
         DynrespError: The file cannot be written.
     """
-    import skops.io
+    data = io.BytesIO()
+    if pipelines is not None:
+        import skops.io
 
-    data = io.BytesIO(skops.io.dumps({name: pipelines[name] for name in MODELS}))
+        data = io.BytesIO(skops.io.dumps({name: pipelines[name] for name in MODELS}))
     with zipfile.ZipFile(data, "a") as archive:
         archive.writestr(_ABOUT, json.dumps(_about(classifier), indent=1, allow_nan=False))
         for model in MODELS:
@@ -147,6 +151,8 @@ def load_pipelines(path: Path | str) -> dict[str, Pipeline]:
     path = Path(path)
     with _opened(path) as archive:
         _read_about(archive)
+        if _SCHEMA not in archive.namelist():
+            raise ClassifierError("holds the compiled models alone, without their pipelines")
         others = _types(json.loads(_text_of(archive, _SCHEMA))) - _TRUSTED
         if others:
             named = ", ".join(sorted(".".join(kind) for kind in others)[:5])

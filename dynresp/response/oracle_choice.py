@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynresp.motion.character import Character
 from dynresp.motion.library import ReactionLibrary
-from dynresp.response.carry_on import search_base_motions
+from dynresp.response.carry_on import BaseFit, search_base_motions
 from dynresp.response.choice import Choice
 from dynresp.response.look_ahead import LookAhead
 from dynresp.response.oracle import OracleResult, search
@@ -28,14 +28,12 @@ class OracleAnswer:
 
     Attributes:
         library: Of all reactions.
-        carry_on: Of the base motion around the moment at which it must fit.
-        carry_on_entry: Frame of the base motion where it fits best.
+        carry_on: How the base motion fits.
         stays: Whether the base motion is carried on.
     """
 
     library: OracleResult
-    carry_on: OracleResult
-    carry_on_entry: int
+    carry_on: BaseFit
     stays: bool
 
 
@@ -89,19 +87,16 @@ class OracleChooser:
         """Choose for each hit."""
         choices = []
         for base, answer in zip(hits.bases, self.answers(hits), strict=True):
-            best, stay = answer.library.best, answer.carry_on.best
+            best, stay = answer.library.best, answer.carry_on
             found = zip(answer.library.names, answer.library.errors, strict=True)
-            chosen = stay if answer.stays else best
-            choices.append(
-                Choice(
-                    name=chosen.reaction,
-                    motion=base if answer.stays else self.library.reaction(best.reaction).motion,
-                    exit=chosen.exit_frame,
-                    entry=answer.carry_on_entry if answer.stays else best.entry_frame,
-                    error=chosen.error,
-                    errors={name: float(e) for name, e in found} | {CARRY_ON: stay.error},
-                )
-            )
+            errors = {name: float(e) for name, e in found} | {CARRY_ON: stay.error}
+            if answer.stays:
+                choice = Choice(CARRY_ON, base, stay.exit, stay.entry, stay.error, errors)
+            else:
+                motion = self.library.reaction(best.reaction).motion
+                place = (best.exit_frame, best.entry_frame)
+                choice = Choice(best.reaction, motion, *place, best.error, errors)
+            choices.append(choice)
         return choices
 
     def answers(self, hits: LookAhead) -> list[OracleAnswer]:
@@ -112,14 +107,12 @@ class OracleChooser:
         cuts = make_many_windows(
             hits.states.centers, hits.states.quaternions, window.exit_frames, window
         )
-        every = range(len(hits))
-        carried = search_base_motions(self.character, self.config, hits, every)
+        carried = search_base_motions(self.character, self.config, hits)
         answers = []
-        for k, (cut, (stay, entry)) in enumerate(zip(cuts, carried, strict=True)):
+        for cut, stay, graze in zip(cuts, carried, hits.grazes, strict=True):
             found = search(cut, self.windows)
             limit = min(found.best.error, self.config.carry_on_max_error)
-            stays = bool(hits.grazes[k]) or stay.best.error <= limit
-            answers.append(OracleAnswer(found, stay, entry, stays))
+            answers.append(OracleAnswer(found, stay, bool(graze) or stay.error <= limit))
         return answers
 
 
@@ -132,9 +125,9 @@ def choice_columns(
         Errors [m], exit frames after contact and entry frames, each (hits, reactions + 1), and
         the class chosen for each hit. The entry of carrying on counts in the base motion.
     """
-    errors = [[*a.library.errors, a.carry_on.best.error] for a in answers]
-    exits = [[*a.library.exit_frames, a.carry_on.best.exit_frame] for a in answers]
-    entries = [[*a.library.entry_frames, a.carry_on_entry] for a in answers]
+    errors = [[*a.library.errors, a.carry_on.error] for a in answers]
+    exits = [[*a.library.exit_frames, a.carry_on.exit] for a in answers]
+    entries = [[*a.library.entry_frames, a.carry_on.entry] for a in answers]
     chosen = [
         len(a.library.names) if a.stays else a.library.names.index(a.library.best.reaction)
         for a in answers

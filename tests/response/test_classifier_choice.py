@@ -9,11 +9,14 @@ from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Impact
 from dynresp.response.budget import chooser_for
+from dynresp.response.carry_on import align_base_motions, search_base_motions
 from dynresp.response.classifier import Classifier, ClassifierError, TrainedFor, TrainedOn
 from dynresp.response.classifier_choice import ClassifierChooser
 from dynresp.response.crowd import Crowd
 from dynresp.response.features import FEATURE_NAMES, SLICES_S, vector_columns
+from dynresp.response.hits import HitStage
 from dynresp.response.labelling import Labelled, Labeller
+from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.prediction import PairwiseQuadratic
 from dynresp.response.respond import Responder
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
@@ -245,3 +248,18 @@ def test_a_classifier_for_something_else_is_refused(
     other = dataclasses.replace(classifier, trained_for=TrainedFor("other", "x", "y"))
     with pytest.raises(ClassifierError, match="another character"):
         ClassifierChooser(character, library, CONFIG, other)
+
+
+def test_the_base_motions_fit_is_the_oracles(
+    character: Character, thrown: list[tuple[Motion, Impact]]
+) -> None:
+    """Two ways to the same numbers: windows cut for a search, and the alignment's kernel."""
+    (batch,) = HitStage(character, CONFIG, 1).batches(thrown[:30])
+    traces = batch.simulation.look_ahead(CONFIG.horizon_s)
+    hits = look_ahead_of(character, CONFIG, batch.bases, batch.prepared, traces)
+    slow = search_base_motions(character, CONFIG, hits)
+    fast = align_base_motions(character, CONFIG, hits)
+    assert len(slow) == len(hits) > 20
+    for a, b in zip(slow, fast, strict=True):
+        assert a.error == pytest.approx(b.error, rel=1e-4, abs=1e-4)
+        assert (a.exit, a.entry) == (b.exit, b.entry)
