@@ -16,7 +16,7 @@ from dynresp.motion.sources import MOTION_SUFFIXES, checked_relative_path
 from dynresp.paths import examples_folder, reactions_folder
 
 COLLECTIONS: Mapping[str, str] = {
-    "core": "what reactions/core.toml and the example experiments use",
+    "core": "what reactions/core.toml, the example experiments and the plans use",
     "full": "core, and what reactions/full.toml uses",
     "all": "every file in reactions/sources.csv",
 }
@@ -39,7 +39,7 @@ def collection_files(
         name: A name in `COLLECTIONS`.
         sources: The known source files; by default the shipped table.
         reactions: Folder of `core.toml` and `full.toml`; by default the shipped one.
-        examples: Folder of the example experiments; by default the shipped one.
+        examples: Folder of the example experiments and plans; by default the shipped one.
 
     Returns:
         Source files, sorted by path.
@@ -55,7 +55,8 @@ def collection_files(
     if name == "all":
         return [sources[file] for file in sorted(sources)]
     reactions = reactions or reactions_folder()
-    libraries = [reactions / "core.toml", *sorted((examples or examples_folder()).glob("*.toml"))]
+    shown = sorted((examples or examples_folder()).rglob("*.toml"))
+    libraries = [reactions / "core.toml", *shown]
     if name == "full":
         libraries.append(reactions / "full.toml")
     wanted: set[str] = set()
