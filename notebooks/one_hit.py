@@ -64,9 +64,7 @@ print(f"choice: {response.choice}, window error {response.error:.2f} m")
 # %%
 surface = landscape(response, character, responder.config)
 fig, ax = plt.subplots(figsize=(7, 4))
-image = ax.pcolormesh(
-    surface.entries_s, surface.exits_s, surface.errors, cmap="viridis_r"
-)
+image = ax.pcolormesh(surface.entries_s, surface.exits_s, surface.errors, cmap="viridis_r")
 ax.set(
     xlabel="entry: time in the reaction [s]",
     ylabel="exit: time after contact [s]",
