@@ -49,12 +49,12 @@ def align(seed: Seed = None, as_json: Json = False) -> None:
 
 @app.command()
 def select(
-    model: Annotated[
+    classifier: Annotated[
         Path | None,
         typer.Option(
-            "--model",
-            metavar="FILE",
-            help="File that `dynresp train` has written; by default a synthetic problem.",
+            "--classifier",
+            metavar="MODEL",
+            help="A classifier with its pipelines; by default a synthetic problem.",
         ),
     ] = None,
     seed: Seed = None,
@@ -64,7 +64,7 @@ def select(
     typer.echo("training and predicting for about ten seconds ...", err=True)
     from dynresp.bench import select as bench
 
-    _print(bench.run(seed or 0, model=model), as_json)
+    _print(bench.run(seed or 0, model=classifier), as_json)
 
 
 @app.command()

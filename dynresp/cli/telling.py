@@ -24,7 +24,7 @@ def tell_result(content: dict[str, Any], out: Path) -> str:
         lines.append(
             f"  contact    {body}, {contact['force_n']:.0f} N, at {contact['time_s']:.2f} s"
         )
-    lines.append(f"  outcome    {_outcome(happened)}")
+    lines.append(f"  outcome    {_outcome(happened)}, chosen by {_chooser(content['choosing'])}")
     if "alignment" in happened:
         at = happened["alignment"]
         lines.append(
@@ -101,6 +101,11 @@ def tell_choosing(content: dict[str, Any]) -> str | None:
         content: Of `result.json` or `summary.json`.
     """
     about = content["choosing"]
+    if "passed_over" in about:
+        return (
+            f"the classifier kept for this library cannot be used, and was passed over: "
+            f"{about['passed_over']}"
+        )
     if "instead_of" in about:
         return (
             f"the oracle chose: there is no classifier for the library {content['library']['name']}"
@@ -115,6 +120,12 @@ def tell_choosing(content: dict[str, Any]) -> str | None:
 def _motion(about: dict[str, Any]) -> str:
     name = about["motion"]
     return f"{name}, for want of {about['instead_of']}" if "instead_of" in about else str(name)
+
+
+def _chooser(about: dict[str, Any]) -> str:
+    if "classifier" not in about:
+        return "the oracle"
+    return f"a classifier trained on {about['classifier']['trained_on']} samples"
 
 
 def _outcome(happened: dict[str, Any]) -> str:

@@ -6,6 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -77,7 +78,8 @@ def train(
         bool,
         typer.Option(
             "--compiled-only",
-            help="Leave out the scikit-learn pipelines, and with them all training samples.",
+            help="In single precision, without the scikit-learn pipelines and thus without any "
+            "training sample.",
         ),
     ] = False,
     seed: Seed = None,
@@ -110,10 +112,14 @@ def train(
         )
         data = load_dataset(dataset)
         file = out or classifier_file(data.facts.library_identity)
+        check_folder(file.parent)
         trained = learning.train(data, config, tell)
         tell("writing", 0, 1)
-        pipelines = None if compiled_only else trained.pipelines
-        save_classifier(file, trained.classifier, pipelines)
+        if compiled_only:
+            exact = trained.classifier.exact.single_precision()
+            save_classifier(file, replace(trained.classifier, exact=exact), None)
+        else:
+            save_classifier(file, trained.classifier, trained.pipelines)
     if as_json:
         typer.echo(json.dumps(_content(trained.classifier, file), indent=2))
     else:

@@ -13,7 +13,7 @@ from dynresp.errors import SpecError
 from dynresp.experiments.hits import draw_hits
 from dynresp.experiments.spec import PushTable
 from dynresp.experiments.values import Choice, Number, Uniform, draw
-from dynresp.physics.impacts import APPROACH_M, APPROACH_S, Impact
+from dynresp.physics.impacts import Impact, flight_s
 
 GOES_ON_S = 1.0
 """A base motion goes on at least this long after a hit [s], so that the servos have what to track
@@ -80,7 +80,7 @@ def lead_s(radius: float, speed: float | None) -> float:
         radius: Of a ball or a fist [m].
         speed: Of a ball or a fist [m/s]; None for a push.
     """
-    return 0.0 if speed is None else max(APPROACH_S, (APPROACH_M + radius) / speed)
+    return 0.0 if speed is None else flight_s(radius, speed)
 
 
 def check_durations(plan: Plan, durations: Sequence[float]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -77,6 +78,21 @@ class Facts:
     settings: Mapping[str, Any]
     versions: Mapping[str, str]
     plan: Mapping[str, Any]
+
+    @property
+    def origin(self) -> str:
+        """Hash of what the samples are drawn from.
+
+        The same for datasets that differ in names, settings, shard size, number of samples or
+        versions of the programs, whose samples of one index are the same hit.
+        """
+        plan = self.plan
+        bases = [
+            {key: value for key, value in base.items() if key != "name"}
+            for base in plan.get("base", [])
+        ]
+        drawn = (self.seed, bases, plan.get("impact", []), self.character_identity)
+        return hashlib.sha256(json.dumps(drawn, sort_keys=True).encode()).hexdigest()[:32]
 
     @property
     def layout(self) -> tuple[Column, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dynresp.errors import SpecError
 from dynresp.experiments.settings import in_force
 from dynresp.experiments.spec import ChoiceTable
 from dynresp.motion.character import Character
@@ -13,7 +14,7 @@ from dynresp.motion.library import BUILTIN, RECORDED, ReactionLibrary
 from dynresp.paths import classifier_file, expanded, models_folder
 from dynresp.response.budget import chooser_for
 from dynresp.response.choice import Chooser
-from dynresp.response.classifier import Classifier, TrainedFor
+from dynresp.response.classifier import Classifier, ClassifierError, TrainedFor
 from dynresp.response.classifier_file import load_classifier
 from dynresp.response.response import ResponseConfig
 
@@ -53,17 +54,30 @@ def take_chooser(
         beside: Folder of the experiment file, from which a relative path counts.
 
     Raises:
+        SpecError: A classifier is named, but the oracle is to choose.
         ClassifierError: A classifier's file is damaged, or it was trained for something else.
         MotionError: A clip of the library is shorter than a window.
     """
     budget = table.budget
+    if budget == "best" and table.classifier is not None:
+        raise SpecError(
+            'choice: with the budget "best" the oracle chooses, and no classifier; leave out '
+            "classifier, or take another budget"
+        )
     about: dict[str, Any] = {"budget": budget}
     classifier = None
     if budget != "best":
         named = None if table.classifier is None else beside / expanded(table.classifier, "choice")
-        classifier = find_classifier(library, character, named)
+        try:
+            classifier = find_classifier(library, character, named)
+        except ClassifierError as error:
+            if named is not None:
+                raise
+            # Nobody named the file that was kept; what is shipped is as it should be.
+            about["passed_over"] = str(error)
+            classifier = _shipped(library, character)
         if classifier is None:
-            about = {"budget": "best", "instead_of": budget}
+            about = {**about, "budget": "best", "instead_of": budget}
             budget = "best"
     if classifier is not None:
         about["classifier"] = _about(classifier, config)
@@ -86,17 +100,20 @@ def find_classifier(
     Raises:
         ClassifierError: The file is damaged, or was trained for something else.
     """
-    own = TrainedFor.of(library, character)
     kept = classifier_file(library.identity)
     if named is not None or kept.is_file():
         classifier = load_classifier(named or kept)
-        classifier.check(own)
+        classifier.check(TrainedFor.of(library, character))
         return classifier
+    return _shipped(library, character)
+
+
+def _shipped(library: ReactionLibrary, character: Character) -> Classifier | None:
     if library.name not in SHIPPED:
         return None
     shipped = load_classifier(shipped_classifier(library.name))
     # Another library may bear the name of one of ours.
-    return shipped if shipped.trained_for == own else None
+    return shipped if shipped.trained_for == TrainedFor.of(library, character) else None
 
 
 def shipped_classifier(library: str) -> Path:

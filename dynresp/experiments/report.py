@@ -138,8 +138,8 @@ def _write_alignment(
         response.entry / fps,
         title=f"{title}: {spoken(response.choice)}",
         unit="m",
-        # Where one reaction alone was aligned there is nothing to compare it with.
-        ranking=ranking if len(ranking) > 1 else [],
+        # One reaction beside the base motion is no ranking.
+        ranking=ranking if len(ranking) > 2 else [],
         chosen_name=response.choice,
     )
 

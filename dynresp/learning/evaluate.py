@@ -23,7 +23,7 @@ from dynresp.learning.groups import Groups
 from dynresp.learning.labelled import Labelled, groups_of, labelled
 from dynresp.learning.latency import latency_us
 from dynresp.learning.split import Split
-from dynresp.response.classifier import Classifier, TrainedFor
+from dynresp.response.classifier import Classifier, ClassifierError, TrainedFor
 
 # Nearest neighbours take a second for so many samples and a hundred thousand to look among.
 _MOST_NEIGHBOURED = 2_000
@@ -51,6 +51,11 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
     facts = dataset.facts
     classifier.check(TrainedFor(facts.library, facts.library_identity, facts.character_identity))
     groups = groups_of(dataset, classifier.grouping)
+    strange = [name for name in classifier.classes if name not in groups.names]
+    if strange:
+        raise ClassifierError(
+            f"the classifier predicts {strange[0]!r}, which the dataset has not; train it anew"
+        )
     known = np.array([groups.names.index(name) for name in classifier.classes], dtype=np.intp)
     usable = labelled(dataset, groups, classifier.columns)
     learning, judged = _parted(classifier, dataset, usable)
@@ -74,7 +79,7 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
             "samples": len(dataset),
         },
         "samples": len(judged),
-        "held_out_only": facts.identity == classifier.trained_on.dataset,
+        "held_out_only": facts.origin == classifier.trained_on.dataset,
         "left_out": {
             "nothing_hit": int(np.count_nonzero(dataset.label < 0)),
             "features_missing": int(np.count_nonzero(dataset.label >= 0)) - len(usable),
@@ -104,7 +109,7 @@ def _parted(
     """The samples that it was trained on, where they are in the dataset, and those to judge by."""
     trained_on = classifier.trained_on
     nothing = np.zeros(0, dtype=np.intp)
-    if dataset.facts.identity != trained_on.dataset:
+    if dataset.facts.origin != trained_on.dataset:
         learning, judged = usable.take(nothing), usable
     else:
         split = Split(trained_on.seed, trained_on.held_out)
@@ -139,9 +144,16 @@ def _in_use(ranked: Choices, judged: Labelled, groups: Groups) -> Choices:
 def _measured(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, Any]:
     return {
         **measure(ranked, judged.labels, judged.errors).to_json(),
+        "reactions_accuracy": _reactions_accuracy(ranked, judged, groups),
         "strategy_accuracy": _strategy_accuracy(ranked, judged, groups),
         "mirrors_as_one": _mirrors_as_one(ranked, judged, groups),
     }
+
+
+def _reactions_accuracy(ranked: Choices, judged: Labelled, groups: Groups) -> float | None:
+    """Share of the oracle's choice where that is a reaction; None where it never is."""
+    rows = judged.labels != groups.carry_on
+    return float(np.mean(ranked[rows, 0] == judged.labels[rows])) if rows.any() else None
 
 
 def _mirrors_as_one(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, float]:

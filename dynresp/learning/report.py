@@ -65,6 +65,7 @@ def write_confusion(path: Path, content: dict[str, Any]) -> None:
     seen = np.flatnonzero(counts.sum(axis=0) + counts.sum(axis=1))
     counts = counts[np.ix_(seen, seen)]
     names = [content["confusion"]["classes"][i].replace("_", " ") for i in seen]
+    rows = [f"{name} ({n})" for name, n in zip(names, counts.sum(axis=1), strict=True)]
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     size = 3.2 + 0.3 * min(len(seen), _MOST_NUMBERED)
     figure = Figure((size + 0.8, size), dpi=_DPI, facecolor="white", layout="constrained")
@@ -72,11 +73,11 @@ def write_confusion(path: Path, content: dict[str, Any]) -> None:
     image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=1.0)
     if len(seen) <= _MOST_NAMED:
         axes.set_xticks(range(len(seen)), names, rotation=90, fontsize=7, parse_math=False)
-        axes.set_yticks(range(len(seen)), names, fontsize=7, parse_math=False)
+        axes.set_yticks(range(len(seen)), rows, fontsize=7, parse_math=False)
     if len(seen) <= _MOST_NUMBERED:
         _number(axes, shares)
-    axes.set_xlabel("chosen by the classifier", fontsize=8.5)
-    axes.set_ylabel("chosen by the oracle", fontsize=8.5)
+    axes.set_xlabel("chosen with the classifier, in use", fontsize=8.5)
+    axes.set_ylabel("chosen by the oracle (how often)", fontsize=8.5)
     bar = figure.colorbar(image, ax=axes, shrink=0.7, pad=0.02)
     bar.set_label("share of the oracle's", fontsize=8.5)
     bar.ax.tick_params(labelsize=8)

@@ -131,8 +131,8 @@ def train(dataset: Dataset, config: TrainConfig, progress: Progress) -> Trained:
     learning = usable.take(config.split.trained(usable.index, config.samples))
     _check_enough(learning, groups, len(dataset), config)
 
-    # One thread: the same bits on every machine; and where others are at work, many small matrices
-    # cost several threads a hundred times as much.
+    # One thread: the same bits whatever the number of cores; and where others are at work, many
+    # small matrices cost several threads a hundred times as much.
     with threadpool_limits(limits=1):
         tried = _search(learning, groups.carry_on, config, progress)
         models = _fit_models(learning, by_merit(tried[-1])[0].parameters, config, progress)
@@ -152,7 +152,7 @@ def train(dataset: Dataset, config: TrainConfig, progress: Progress) -> Trained:
         feature_names=names,
         trained_for=TrainedFor(facts.library, facts.library_identity, facts.character_identity),
         trained_on=TrainedOn(
-            dataset=facts.identity,
+            dataset=facts.origin,
             count=facts.count,
             samples=len(learning),
             limit=config.samples,

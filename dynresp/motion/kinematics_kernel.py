@@ -6,23 +6,14 @@ it is used. The sums are those of `rotations.multiply` and `rotations.rotate`, i
 
 from __future__ import annotations
 
-from typing import Any
-
 from numba import njit, types
+
+from dynresp.compiling import compiled
 
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
 _INTS = types.Array(types.int64, 1, "C", readonly=True)
 _OUT = types.float64[:, :, ::1]
 _SIGNATURE = types.void(_ROWS, _INTS, _ROWS, _ROWS, _OUT, _OUT, _OUT)
-
-
-def _compiled(function: Any) -> Any:
-    """Compile for `_SIGNATURE`; kept for the next process where a folder can be written to."""
-    try:
-        return njit(_SIGNATURE, cache=True, nogil=True)(function)
-    except RuntimeError:
-        # Numba found no place for its cache: an installation and a home that are read-only.
-        return njit(_SIGNATURE, nogil=True)(function)
 
 
 @njit(inline="always")
@@ -36,7 +27,7 @@ def _carry(q, v, start, out):  # type: ignore[no-untyped-def]
     out[2] = start[2] + (v[2] + q[0] * r + q[1] * s - q[2] * p)
 
 
-@_compiled
+@compiled(_SIGNATURE)
 def kinematics_kernel(  # type: ignore[no-untyped-def]
     poses, parents, offsets, center_offsets, positions, quaternions, centers
 ):

@@ -222,7 +222,7 @@ def prepare(
     """
     lead = 0.0 if isinstance(impact, Push) else APPROACH_S
     if isinstance(impact, Ball):
-        lead = max(lead, (APPROACH_M + impact.radius) / impact.speed)
+        lead = flight_s(impact.radius, impact.speed)
     start = int(np.floor((impact.time - lead) * base.fps + 1e-9))
     if start < 0 or impact.time > base.duration:
         raise SpecError(
@@ -244,6 +244,11 @@ def prepare(
     if isinstance(impact, Strike):
         return _prepare_strike(impact, base, character, config, start, due_s)
     return _prepare_projectile(impact, base, character, start, due_s)
+
+
+def flight_s(radius: float, speed: float) -> float:
+    """How long before it is due a ball or a fist of a radius [m] and speed [m/s] is let go [s]."""
+    return max(APPROACH_S, (APPROACH_M + radius) / speed)
 
 
 def _direction(impact: Impact, base: Motion) -> FloatArray:

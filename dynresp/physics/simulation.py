@@ -211,7 +211,13 @@ class Simulation:
         first = [self.frame(i) for i in ids]
         found = self._run(np.asarray(ids), rows, (spec,), first, frames)[spec]
         for row, i in enumerate(ids):
-            if self._diverged[i] is None:
+            diverged = self._diverged[i]
+            if diverged is not None:
+                # After that its records repeat the last one, and time stands still.
+                ran = int(np.count_nonzero(np.diff(found[row, :, 0]) > 0)) + 1
+                frame = first[row] + min((ran - 1) // self.substeps, frames - 1)
+                self._diverged[i] = Divergence(frame, diverged.warning)
+            else:
                 ends = found[row, self.substeps - 1 :: self.substeps]
                 self._states[i].extend(state.copy() for state in ends)
 

@@ -15,12 +15,12 @@ which arrays overlap; the slopes along both times come out of the same pass.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numba import njit, types
 
+from dynresp.compiling import compiled
 from dynresp.response.windows import LANES
 
 # The polynomial Q of `window_kernel`: angle = chord Q(chord^2).
@@ -68,19 +68,6 @@ _PLAIN: dict[str, Any] = {"error_model": "numpy"}
 # Sums may be spread over the lanes of a vector: other bits on another processor, but the same on
 # every call. Input is free of NaN (`lay_out`).
 _FAST: dict[str, Any] = {**_PLAIN, "fastmath": {"contract", "nnan", "nsz", "reassoc"}}
-
-
-def _compiled(signature: Any) -> Callable[[Any], Any]:
-    """Compile for a signature; kept for the next process where a folder can be written to."""
-
-    def compiled(function: Any) -> Any:
-        try:
-            return njit(signature, cache=True, nogil=True, **_PLAIN)(function)
-        except RuntimeError:
-            # Numba found no place for its cache: an installation and a home that are read-only.
-            return njit(signature, nogil=True, **_PLAIN)(function)
-
-    return compiled
 
 
 @njit(forceinline=True, **_FAST)
@@ -189,7 +176,7 @@ def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):
     return _measure(a, a_row, s, exit_at - s, b, b_row, m, entry_at - m, bodies, wp, wt)
 
 
-@_compiled(_LAY_OUT)
+@compiled(_LAY_OUT, **_PLAIN)
 def lay_out(positions, quaternions, frames, rows):  # type: ignore[no-untyped-def]
     """Lay out a track; one more frame, a copy of the last, and finite padding follow.
 
@@ -294,7 +281,7 @@ def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step
     return f, s, m, evaluations
 
 
-@_compiled(_ALIGN)
+@compiled(_ALIGN, **_PLAIN)
 def align_kernel(  # type: ignore[no-untyped-def]
     positions, quaternions, rows, clips, places, wp, wt, frames, exits, step, patience, starts,
     most, gain, found,
@@ -377,7 +364,7 @@ def align_kernel(  # type: ignore[no-untyped-def]
     return -1
 
 
-@_compiled(_ERRORS)
+@compiled(_ERRORS, **_PLAIN)
 def errors_kernel(  # type: ignore[no-untyped-def]
     positions, quaternions, clips, place, wp, wt, frames, exits, entries, errors
 ):

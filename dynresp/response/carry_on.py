@@ -62,14 +62,17 @@ def align_base_motions(
         config: Settings.
         hits: Simulated hits.
     """
-    fits = []
+    fits, window = [], config.window
     for row, (track, leave, first) in enumerate(_near(character, config, hits)):
         seen = hits.states_of(row)
-        entries = np.arange(len(track.positions) - config.window.window_frames + 1)
-        aligner = Aligner([track], replace(config.window, exit_min_s=leave / config.window.fps))
+        room = len(track.positions) - window.window_frames + 1
+        entries = np.arange(0, room, window.entry_step)
+        leave_s = leave / window.fps
+        aligner = Aligner([track], replace(window, exit_min_s=leave_s, exit_max_s=leave_s))
         errors = aligner.errors(seen.centers, seen.quaternions, CARRY_ON, leave, entries)
         best = int(errors.argmin())
-        fits.append(_fit(hits, row, float(errors[best]), leave, first + best))
+        entry = first + int(entries[best])
+        fits.append(_fit(hits, row, float(errors[best]), leave, entry))
     return fits
 
 

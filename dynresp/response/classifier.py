@@ -52,7 +52,8 @@ class TrainedOn:
     """Which samples a classifier was trained on (`dynresp.learning.split`).
 
     Attributes:
-        dataset: Identity of the dataset, the same however many samples it has.
+        dataset: Origin of the dataset (`datasets.facts.Facts.origin`), the same however many
+            samples it has.
         count: How many samples the dataset had, misses and all.
         samples: How many of them were trained on.
         limit: How many were asked for; None for all that were not held out.

@@ -14,7 +14,7 @@ from dynresp.response.alignment import Aligner, AlignmentConfig
 from dynresp.response.alignment_result import Alignment
 from dynresp.response.carry_on import BaseFit, align_base_motions
 from dynresp.response.choice import Choice
-from dynresp.response.classifier import Classifier, TrainedFor
+from dynresp.response.classifier import Classifier, ClassifierError, TrainedFor
 from dynresp.response.features import extract
 from dynresp.response.look_ahead import LookAhead
 from dynresp.response.oracle_choice import reaction_tracks
@@ -60,6 +60,13 @@ class ClassifierChooser:
             MotionError: A clip is shorter than a window.
         """
         classifier.check(TrainedFor.of(library, character))
+        known = {CARRY_ON, *(reaction.name for reaction in library.reactions)}
+        strange = sorted({name for own in classifier.members for name in own} - known)
+        if strange:
+            raise ClassifierError(
+                f"the classifier predicts {strange[0]!r}, which the library {library.name!r} has "
+                "not; train it anew"
+            )
         self.character = character
         self.library = library
         self.config = config

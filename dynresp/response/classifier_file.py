@@ -45,7 +45,7 @@ from dynresp.response.prediction import PairwiseQuadratic
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
 
-FORMAT, FORMAT_VERSION = "dynresp classifier", 1
+FORMAT, FORMAT_VERSION = "dynresp classifier", 2
 SUFFIX = ".skops"
 MODELS = ("exact", "reduced")
 """Names of the two models, in the file and as attributes of `Classifier`."""

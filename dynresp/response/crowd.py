@@ -55,12 +55,14 @@ class Crowd:
             config: Settings.
             chooser: What chooses; None for the oracle.
             threads: Threads for the physics, 0 for all cores.
-            stage: Where scenes are kept, for several crowds of one body and the same settings;
-                None for one of its own.
+            stage: Where scenes are kept, for several crowds of one body and the same settings,
+                with its own number of threads; None for one of its own.
 
         Raises:
-            MotionError: A motion has another frame rate.
+            MotionError: There is no base motion, or a motion has another frame rate.
         """
+        if not bases:
+            raise MotionError("a crowd needs at least one base motion; none was given")
         self.config = config or ResponseConfig()
         fps = self.config.physics.fps
         for motion in [*bases, *(reaction.motion for reaction in library.reactions)]:
@@ -166,6 +168,9 @@ class Crowd:
             if self.config.transition.second_pass:
                 # All of what follows the contact is simulated anew, towards what was chosen.
                 flight.trace = finish(simulation, {i: choice}, self.config.transition)[i]
+                if flight.trace.diverged is not None:
+                    self._give_up(i, EventKind.DIVERGED)
+                    continue
             else:
                 simulation.rewind(i, trace.contact.frame + choice.exit)
             responder.tell(EventKind.REWOUND, contact_frame)

@@ -14,12 +14,17 @@ from dynresp.errors import SpecError
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import Impact, PreparedImpact, prepare
+from dynresp.physics.impacts import WAIT_S, Impact, PreparedImpact, Push, prepare
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Setup, Trace
 from dynresp.response.choice import Choice
 from dynresp.response.transition import place_on
 
+# Times of a hit count from where the plan began, as long as that is less than this ago [s]: what is
+# past is of no use, and a character may play for hours.
+_REMEMBERED_S = 10.0
+# Latest time from now at which a hit can be asked for [s].
+_LATEST_S = 60.0
 # How much of what it would do a hit is prepared with, beyond the time at which it is due [s]: the
 # longest look-ahead, with room for the blend.
 _BEYOND_S = 5.0
@@ -81,12 +86,12 @@ class Invoked:
     Attributes:
         impact: What hits; its time counts from frame 0.
         launch: When its simulation begins.
-        due: The first frame at or after the moment at which it is due.
+        until: The last frame at which it may still hit.
     """
 
     impact: Impact
     launch: int
-    due: int
+    until: int
 
 
 @dataclass
@@ -94,14 +99,16 @@ class Flight:
     """A hit that is being simulated.
 
     Attributes:
+        invoked: What was asked for.
         launch: When its simulation began.
         setup: Where it began from.
         base: What the character would do without it, from the launch on.
-        trace: The simulation up to the exit, once it is chosen when to leave it.
+        trace: What was simulated, once it is chosen when to leave it: at least to the exit.
         choice: What was chosen.
         exit: When the simulation is left.
     """
 
+    invoked: Invoked
     launch: int
     setup: Setup
     base: Motion
@@ -117,6 +124,7 @@ class DynamicResponder:
         character: Its body.
         physics: How it is simulated.
         frame: What its clock shows.
+        pose: (59,) what it shows itself.
         phase: What moves it.
         events: What happened to it, in order.
         flight: The last hit that was simulated, None before the first.
@@ -133,18 +141,9 @@ class DynamicResponder:
         self._plan = base.poses
         self._plan_from = 0
         self._name = base.name
-        self._shown = [base.poses[0]]
+        self.pose = base.poses[0]
+        self._before: FloatArray | None = None
         self._invoked: list[Invoked] = []
-
-    @property
-    def pose(self) -> FloatArray:
-        """(59,) what it shows now."""
-        return self._shown[-1]
-
-    @property
-    def shown(self) -> Motion:
-        """Everything that it has shown so far."""
-        return Motion(np.stack(self._shown), self.physics.fps, self._name)
 
     def hit(self, impact: Impact) -> None:
         """Let something hit it.
@@ -153,9 +152,11 @@ class DynamicResponder:
             impact: What; its time counts from now. A ball needs time to fly there, a push none.
 
         Raises:
-            SpecError: It comes too soon, or while something else is on its way.
+            SpecError: It comes too soon or too late, or while something else is on its way.
         """
         fps = self.physics.fps
+        if not impact.time <= _LATEST_S:
+            raise SpecError(f"time must be at most {_LATEST_S:g} s from now, got {impact.time:g}")
         asked = replace(impact, time=impact.time + self.frame / fps)
         _, _, launch = self._prepared(asked)
         if launch < self.frame:
@@ -163,14 +164,14 @@ class DynamicResponder:
                 f"time: the impact is due {impact.time:g} s from now and needs "
                 f"{impact.time + (self.frame - launch) / fps:.2f} s to come"
             )
-        new = Invoked(asked, launch, int(np.ceil(asked.time * fps)))
+        wait_s = 0.0 if isinstance(impact, Push) else WAIT_S
+        new = Invoked(asked, launch, int(np.ceil((asked.time + wait_s) * fps)))
         for other in self._on_their_way():
-            if new.launch <= other.due and other.launch <= new.due:
+            if new.launch <= other.until and other.launch <= new.until:
                 raise SpecError(
-                    f"time: something else is on its way until "
-                    f"{(other.due - self.frame) / self.physics.fps:.2f} s from now, and this would "
-                    f"be from {(new.launch - self.frame) / self.physics.fps:.2f} s on; one thing "
-                    "at a time can come"
+                    f"time: something else may hit until {(other.until - self.frame) / fps:.2f} s "
+                    f"from now, and this would be on its way from "
+                    f"{(new.launch - self.frame) / fps:.2f} s on; one thing at a time can come"
                 )
         self._invoked.append(new)
 
@@ -192,7 +193,7 @@ class DynamicResponder:
             pose=None if playing else self.pose,
             held=playing,
         )
-        self.flight = Flight(self.frame, setup, base)
+        self.flight = Flight(coming[0], self.frame, setup, base)
         self.phase = Phase.APPROACH
         self.tell(EventKind.INVOKED)
         return self.flight
@@ -204,7 +205,7 @@ class DynamicResponder:
     def show(self, pose: FloatArray) -> None:
         """Show a pose at the next frame of the clock."""
         self.frame += 1
-        self._shown.append(pose)
+        self._before, self.pose = self.pose, pose
 
     def plan(self, poses: FloatArray, first: int) -> None:
         """Set what it plays.
@@ -223,7 +224,10 @@ class DynamicResponder:
     # -- what it would do -----------------------------------------------------------------------
 
     def _on_their_way(self) -> list[Invoked]:
-        return [invoked for invoked in self._invoked if invoked.due >= self.frame]
+        """What was asked for and has neither hit nor missed."""
+        if self.phase is Phase.APPROACH and self.flight is not None:
+            return [self.flight.invoked, *self._invoked]
+        return self._invoked
 
     def _prepared(self, impact: Impact) -> tuple[PreparedImpact, Motion, int]:
         """A hit made ready: for the simulation, what the character would do, and when it begins.
@@ -254,13 +258,16 @@ class DynamicResponder:
             frames = max(needed, len(poses) - entry)
             at = np.clip(entry + np.arange(frames), 0, len(poses) - 1)
             return place_on(poses[at], 0, self.pose), self.frame
+        first = self._plan_from
+        if self.frame - first > _REMEMBERED_S * self.physics.fps:
+            first = self.frame
         until = max(self.frame + needed, self._plan_from + len(self._plan))
-        return self.planned(self._plan_from, until - self._plan_from), self._plan_from
+        return self.planned(first, until - first), first
 
     def _velocity(self) -> FloatArray:
         """How it moves now (45,)."""
         if self.phase is Phase.PHYSICS and self.flight is not None and self.flight.trace:
             return self.flight.trace.velocities[self.frame - self.flight.launch]
-        before = self._shown[-2:-1]
-        near = np.concatenate([*(pose[None] for pose in before), self.planned(self.frame, 2)])
+        before = [] if self._before is None else [self._before[None]]
+        near = np.concatenate([*before, self.planned(self.frame, 2)])
         return pose_velocities(near, self.physics.fps)[len(before)]

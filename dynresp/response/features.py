@@ -88,9 +88,13 @@ those of centres of mass [m], orientations rotation vectors [rad] from the rest 
 m/s and rad/s; "com" is the centre of mass of the whole character."""
 
 
+VERSION = 1
+"""Of what the names stand for: raised when a feature of the same name means something else."""
+
+
 def identity() -> str:
     """Short hash of what the features are; other features have another."""
-    return hashlib.sha256(" ".join(FEATURE_NAMES).encode()).hexdigest()[:16]
+    return hashlib.sha256(" ".join([str(VERSION), *FEATURE_NAMES]).encode()).hexdigest()[:16]
 
 
 def slice_frames(fps: float) -> npt.NDArray[np.intp]:

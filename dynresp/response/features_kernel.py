@@ -8,10 +8,11 @@ microseconds, where NumPy takes half a millisecond for its calls.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import njit, types
+
+from dynresp.compiling import compiled
 
 _REALS = types.Array(types.float64, 1, "C", readonly=True)
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
@@ -23,15 +24,6 @@ _SIGNATURE = types.void(
 
 # Below this length of the vector part of a quaternion its angle is twice that length.
 _SMALL = 5e-7
-
-
-def _compiled(function: Any) -> Any:
-    """Compile for `_SIGNATURE`; kept for the next process where a folder can be written to."""
-    try:
-        return njit(_SIGNATURE, cache=True, nogil=True)(function)
-    except RuntimeError:
-        # Numba found no place for its cache: an installation and a home that are read-only.
-        return njit(_SIGNATURE, nogil=True)(function)
 
 
 @njit(inline="always")
@@ -64,7 +56,7 @@ def _write(cosine, sine, v, out, at):  # type: ignore[no-untyped-def]
     out[at + 2] = v[2]
 
 
-@_compiled
+@compiled(_SIGNATURE)
 def features_kernel(  # type: ignore[no-untyped-def]
     poses, velocities, frames, parents, offsets, centers, shares, chosen, features
 ):

@@ -15,11 +15,10 @@ places are found likewise among the rest, with what is already known.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numba import njit, types
+
+from dynresp.compiling import compiled
 
 LANES = 64
 """Rows of weights are padded with zeros to a multiple of this, so that loops have no remainder."""
@@ -158,20 +157,7 @@ def _all_pairs(weights, monomials, decisions):  # type: ignore[no-untyped-def]
             decisions[n, pair] = total
 
 
-def _compiled(signatures: Any) -> Callable[[Any], Any]:
-    """Compile for `signatures`; kept for the next process where a folder can be written to."""
-
-    def compile_(function: Any) -> Any:
-        try:
-            return njit(signatures, cache=True, nogil=True)(function)
-        except RuntimeError:
-            # Numba found no place for its cache: an installation and a home that are read-only.
-            return njit(signatures, nogil=True)(function)
-
-    return compile_
-
-
-@_compiled(
+@compiled(
     [
         types.int64(_ROWS, _ROWS, _VECTOR, weights, types.int64, types.int64[:, ::1])
         for weights in (_ROWS, _SINGLE)
@@ -220,7 +206,7 @@ def rank_kernel(features, projection, offset, weights, classes, ranks):  # type:
     return -1
 
 
-@_compiled(
+@compiled(
     [
         types.int64(_ROWS, _ROWS, _VECTOR, weights, types.Array(scalar, 2, "C"))
         for weights, scalar in ((_ROWS, types.float64), (_SINGLE, types.float32))
@@ -252,7 +238,7 @@ def decision_kernel(features, projection, offset, weights, decisions):  # type: 
     return -1
 
 
-@_compiled(
+@compiled(
     [
         types.void(types.int64, types.Array(scalar, 2, "C"), types.float64[:, ::1])
         for scalar in (types.float64, types.float32)

@@ -11,6 +11,7 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import PreparedImpact
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Contact, Divergence
+from dynresp.response.features import SLICES_S
 from dynresp.response.transition import TransitionConfig
 from dynresp.response.windows import WindowErrorConfig
 
@@ -79,9 +80,9 @@ class ResponseConfig:
 
     @property
     def horizon_s(self) -> float:
-        """How long the simulation looks ahead after contact [s]."""
+        """How long the simulation looks ahead after contact [s]: all windows, all features."""
         latest = max(self.window.exit_max_s, self.carry_on_exit_s, GRAZE_S)
-        return latest + self.window.window_s
+        return max(latest + self.window.window_s, SLICES_S[-1])
 
 
 @dataclass(frozen=True)

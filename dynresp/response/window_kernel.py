@@ -17,10 +17,11 @@ polynomial Q it needs no branch and no library call.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numba import njit, types
+
+from dynresp.compiling import compiled
 
 # Q(u) = 4 asin(sqrt(u) / 2) / sqrt(u) on 0 <= u <= 2 (rotations up to 180 degrees): weighted least
 # squares driven to the smallest largest relative error, 5.8e-6. Two more terms would bring 1.8e-7
@@ -72,17 +73,7 @@ def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
     return wp * distance + wt * (math.sqrt(u) * q)
 
 
-def _compiled(function: Any) -> Any:
-    """Compile for `_SIGNATURE`; kept for the next process where a folder can be written to."""
-    options = {"nogil": True, "fastmath": _FASTMATH}
-    try:
-        return njit(_SIGNATURE, cache=True, **options)(function)
-    except RuntimeError:
-        # Numba found no place for its cache: an installation and a home that are read-only.
-        return njit(_SIGNATURE, **options)(function)
-
-
-@_compiled
+@compiled(_SIGNATURE, fastmath=_FASTMATH)
 def search_kernel(  # type: ignore[no-untyped-def]
     trace,
     exits,

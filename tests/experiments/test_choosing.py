@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from dynresp.errors import SpecError
 from dynresp.experiments.choosing import SHIPPED, find_classifier, shipped_classifier
 from dynresp.experiments.reading import parse_experiment
 from dynresp.experiments.runner import Run, prepare_run
@@ -97,8 +98,11 @@ def test_a_classifier_that_was_kept_comes_before_the_shipped_one(
     kept = classifier_file(builtin.identity)
     kept.parent.mkdir(parents=True)
     kept.write_bytes(b"damaged")
-    with pytest.raises(ClassifierError, match=str(kept)):
-        prepared(tmp_path)
+    # Nobody named it: what is shipped is taken, and that is said.
+    about = prepared(tmp_path).about()["choosing"]
+    assert str(kept) in about["passed_over"]
+    assert about["budget"] == "fast"
+    assert about["classifier"]["trained_on"] > 4000
     kept.write_bytes(shipped_classifier(BUILTIN).read_bytes())
     assert find_classifier(builtin, character) is not None
 
@@ -114,6 +118,11 @@ def test_a_named_classifier_must_be_there_and_fit(tmp_path: Path, character: Cha
         find_classifier(other, character, tmp_path / "mine.skops")
     # What is shipped is passed over where another library bears the name.
     assert find_classifier(dataclasses.replace(other, name=BUILTIN), character) is None
+
+
+def test_the_oracle_takes_no_classifier(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="no classifier"):
+        prepared(tmp_path, choice={"classifier": "gone.skops", "budget": "best"})
 
 
 def test_other_settings_are_told(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from dynresp.response.classifier import ClassifierError
 from .conftest import QUICK
 from .samples import CHOICES, SETTINGS, dataset, quiet
 
+OTHER_PLAN = {"plan": {"name": "Another"}, "impact": [{"kind": "push"}]}
+
 
 def test_figures_of_what_was_held_out(trained: Trained, hits: Dataset) -> None:
     content = evaluate(trained.classifier, hits, quiet)
@@ -56,7 +58,7 @@ def test_it_beats_chance_and_latency_is_measured(trained: Trained, hits: Dataset
 
 
 def test_of_another_dataset_all_samples_count(trained: Trained) -> None:
-    other = dataset(150, seed=5, identity="another")
+    other = dataset(150, seed=5, plan=OTHER_PLAN)
     content = evaluate(trained.classifier, other, quiet)
     assert content["samples"] == np.count_nonzero(other.label >= 0)
     assert not content["held_out_only"]
@@ -71,11 +73,18 @@ def test_a_dataset_that_has_grown_since(trained: Trained) -> None:
     assert content["samples"] == np.count_nonzero(held_out)
 
 
+def test_the_same_samples_in_other_shards_are_not_judged_as_if_unseen(trained: Trained) -> None:
+    other = dataset(400, identity="of other shards", shard_size=20, versions={"numpy": "9"})
+    content = evaluate(trained.classifier, other, quiet)
+    held_out = Split(0, 0.1).is_held_out(other.index) & (other.label >= 0)
+    assert content["samples"] == np.count_nonzero(held_out)
+
+
 def test_nothing_to_judge_by(hits: Dataset) -> None:
     all_of_it = train(hits, replace(QUICK, split=Split(0, 0.0)), quiet).classifier
     with pytest.raises(UsageError, match="--held-out"):
         evaluate(all_of_it, hits, quiet)
-    missed = replace(dataset(20, identity="another"), label=np.full(20, -1, np.int16))
+    missed = replace(dataset(20, plan=OTHER_PLAN), label=np.full(20, -1, np.int16))
     with pytest.raises(UsageError, match="none of the 20"):
         evaluate(all_of_it, missed, quiet)
 

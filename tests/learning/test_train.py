@@ -61,7 +61,12 @@ def test_what_it_was_trained_on_is_told(trained: Trained, hits: Dataset) -> None
     missed = int(np.count_nonzero(hits.label < 0))
     usable = hits.index[hits.label >= 0]
     assert on.samples == len(Split(0, 0.1).trained(usable))
-    assert (on.dataset, on.count, on.limit, on.held_out) == ("made up", len(hits), None, 0.1)
+    assert (on.dataset, on.count, on.limit, on.held_out) == (
+        hits.facts.origin,
+        len(hits),
+        None,
+        0.1,
+    )
     assert facts["left_out"] == missed
     assert sum(facts["samples_per_class"].values()) == on.samples
     (tried,) = facts["cross_validation"]["rounds"]

@@ -15,9 +15,7 @@ from dynresp.errors import UsageError
 
 FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = [
-    path
-    for path in sorted(FOLDER.glob("*.py"))
-    if path.read_text().startswith("# ---\n# jupyter:")
+    path for path in sorted(FOLDER.glob("*.py")) if path.read_text().startswith("# ---\n# jupyter:")
 ]
 
 
@@ -43,7 +41,8 @@ def test_a_notebook_runs(path: Path, study: ModuleType) -> None:
 
     mpl.use("Agg")
     try:
-        runpy.run_path(str(path))
+        with mpl.rc_context():
+            runpy.run_path(str(path))
     finally:
         plt.close("all")
 

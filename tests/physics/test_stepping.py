@@ -348,3 +348,37 @@ def test_a_simulation_put_where_another_was_is_what_it_would_be_alone(
     np.testing.assert_array_equal(traces[last].velocities, expected[last].velocities)
     assert traces[last].contact == expected[last].contact
     np.testing.assert_array_equal(traces[0].velocities, before.velocities)
+
+
+def test_a_simulation_that_blew_up_is_forgotten_when_it_is_replaced(
+    scene_of: SceneMaker, base: Motion, character: Character
+) -> None:
+    kind = ImpactorKind.PROJECTILE
+    impacts = _impacts(kind, character)[:1]
+    expected = simulation_of(scene_of(kind), base, impacts, 1)
+    simulation = simulation_of(scene_of(kind), base, impacts, 1)
+    simulation._batch.bind("qvel")[0, :6] = 1e12
+    assert simulation.look_ahead(HORIZON_S)[0].diverged is not None
+    simulation.replace(0, expected.setups[0])
+    assert simulation.diverged(0) is None
+    (again,), (trace,) = simulation.look_ahead(HORIZON_S), expected.look_ahead(HORIZON_S)
+    np.testing.assert_array_equal(again.velocities, trace.velocities)
+
+
+def test_one_that_blows_up_while_going_on_says_in_which_frame(
+    scene_of: SceneMaker, base: Motion, character: Character
+) -> None:
+    kind = ImpactorKind.PROJECTILE
+    impacts = _impacts(kind, character)[:1]
+    one_by_one, at_once = (simulation_of(scene_of(kind), base, impacts, 1) for _ in range(2))
+    for simulation in (one_by_one, at_once):
+        while simulation.contact(0) is None:
+            simulation.approach([0])
+        # So fast that it goes wrong only after some frames.
+        simulation._batch.bind("qvel")[0, :3] = 3e5
+    for _ in range(20):
+        if one_by_one.diverged(0) is None:
+            one_by_one.approach([0])
+    at_once.go_on([0], 20)
+    assert one_by_one.diverged(0) == at_once.diverged(0)
+    assert one_by_one.diverged(0) is not None

@@ -1,5 +1,7 @@
 """A tiny reaction library, hits, and how responses are compared."""
 
+from typing import Any
+
 import numpy as np
 
 from dynresp.motion import rotations
@@ -8,6 +10,7 @@ from dynresp.motion.library import Reaction, ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball, Impact, Punch, Push
+from dynresp.response.crowd import Crowd
 from dynresp.response.response import Response
 from tests.physics.samples import about_y, turned
 
@@ -40,6 +43,23 @@ def leaning(character: Character, frames: int = 45) -> Motion:
     for side in ("left", "right"):
         joints[f"{side}_shoulder"] = about_y(-1.2 * bend)
     return Motion(turned(character, joints, frames), 30.0, "leaning")
+
+
+class WatchedCrowd(Crowd):
+    """A crowd that remembers all that it has shown."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._poses = [[responder.pose] for responder in self.responders]
+
+    def advance(self) -> FloatArray:
+        poses = super().advance()
+        for own, pose in zip(self._poses, poses, strict=True):
+            own.append(pose)
+        return poses
+
+    def shown(self, i: int = 0) -> Motion:
+        return Motion(np.stack(self._poses[i]), self.config.physics.fps, "shown")
 
 
 def tiny_library(**motions: Motion) -> ReactionLibrary:

@@ -12,7 +12,6 @@ from dynresp.response.budget import chooser_for
 from dynresp.response.carry_on import align_base_motions, search_base_motions
 from dynresp.response.classifier import Classifier, ClassifierError, TrainedFor, TrainedOn
 from dynresp.response.classifier_choice import ClassifierChooser
-from dynresp.response.crowd import Crowd
 from dynresp.response.features import FEATURE_NAMES, SLICES_S, vector_columns
 from dynresp.response.hits import HitStage
 from dynresp.response.labelling import Labelled, Labeller
@@ -20,7 +19,7 @@ from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.prediction import PairwiseQuadratic
 from dynresp.response.respond import Responder
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
-from tests.response.samples import FLUFF, same_response
+from tests.response.samples import FLUFF, WatchedCrowd, same_response
 
 CONFIG = ResponseConfig()
 HITS = 90
@@ -216,14 +215,15 @@ def test_a_character_at_run_time_chooses_alike(
 ) -> None:
     chooser = ClassifierChooser(character, library, CONFIG, classifier, best=2)
     expected = _responses(character, library, thrown[:8], chooser)
-    crowd = Crowd(character, library, [base for base, _ in thrown[:8]], CONFIG, chooser, threads=1)
+    bases = [base for base, _ in thrown[:8]]
+    crowd = WatchedCrowd(character, library, bases, CONFIG, chooser, threads=1)
     for responder, (_, impact) in zip(crowd.responders, thrown[:8], strict=True):
         responder.hit(impact)
     longest = max(len(response.motion) for response in expected)
     for _ in range(longest):
         crowd.advance()
-    for responder, response in zip(crowd.responders, expected, strict=True):
-        shown = responder.shown.poses
+    for i, response in enumerate(expected):
+        shown = crowd.shown(i).poses
         if response.choice is not None:
             np.testing.assert_allclose(
                 shown[: response.end], response.motion.poses[: response.end], atol=1e-12

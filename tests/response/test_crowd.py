@@ -1,5 +1,8 @@
 """Characters at run time: events in their order, one continuous motion, second hits, misses."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,29 +11,29 @@ from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
-from dynresp.physics.impacts import Ball, Impact, Punch, Push
-from dynresp.response.crowd import Crowd
+from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
+from dynresp.physics.simulation import Simulation
 from dynresp.response.dynamic import DynamicResponder, EventKind, Phase
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.transition import TransitionConfig
-from tests.physics.samples import walking
-from tests.response.samples import FLUFF, HITS
+from tests.physics.samples import punching, walking
+from tests.response.samples import FLUFF, HITS, WatchedCrowd
 
 HARD = Ball(1.0, speed=12.0, mass=8.0)
 
 
 def _crowd(
     character: Character, library: ReactionLibrary, *bases: Motion, second_pass: bool = False
-) -> Crowd:
+) -> WatchedCrowd:
     config = ResponseConfig(transition=TransitionConfig(second_pass=second_pass))
-    return Crowd(character, library, bases, config, threads=1)
+    return WatchedCrowd(character, library, bases, config, threads=1)
 
 
 def _kinds(responder: DynamicResponder) -> list[EventKind]:
     return [event.kind for event in responder.events]
 
 
-def _run_until(crowd: Crowd, phase: Phase, most: int = 200) -> None:
+def _run_until(crowd: WatchedCrowd, phase: Phase, most: int = 200) -> None:
     for _ in range(most):
         if crowd.responders[0].phase is phase:
             return
@@ -59,7 +62,7 @@ def test_a_hit_is_answered_as_by_the_responder(
     crowd.responders[0].hit(HITS[which])
     for _ in range(len(expected.motion) - 1):
         crowd.advance()
-    shown = crowd.responders[0].shown
+    shown = crowd.shown()
     # What is carried on goes on longer here than a response shows it.
     length = min(len(shown), len(expected.motion))
     # The finished motion has its quaternions normalised once more.
@@ -102,7 +105,7 @@ def test_a_second_pass_tracks_the_choice_from_the_contact_on(
         crowd.responders[0].hit(HARD)
         for _ in range(80):
             crowd.advance()
-        shown.append(crowd.responders[0].shown.poses)
+        shown.append(crowd.shown().poses)
         contact = crowd.responders[0].events[1].frame
     np.testing.assert_array_equal(shown[0][: contact + 1], shown[1][: contact + 1])
     assert (
@@ -157,7 +160,7 @@ def test_a_second_hit_takes_over_from_where_the_character_is(
         crowd.advance()
     assert _kinds(responder).count(EventKind.CHOSEN) == 2
     assert responder.phase is Phase.PLAYING
-    _is_continuous(responder.shown)
+    _is_continuous(crowd.shown())
 
 
 def test_a_second_ball_hits_a_character_in_the_blend(
@@ -171,7 +174,7 @@ def test_a_second_ball_hits_a_character_in_the_blend(
     for _ in range(90):
         crowd.advance()
     assert _kinds(responder).count(EventKind.CONTACT) == 2
-    _is_continuous(responder.shown)
+    _is_continuous(crowd.shown())
 
 
 @pytest.mark.parametrize("when", ["playing", "in physics"])
@@ -188,7 +191,7 @@ def test_after_a_miss_it_goes_back_to_what_it_did(
         crowd.advance()
     assert EventKind.MISSED in _kinds(responder)
     assert responder.phase is Phase.PLAYING
-    _is_continuous(responder.shown)
+    _is_continuous(crowd.shown())
     if when == "playing":
         np.testing.assert_allclose(responder.pose, base.poses[60], atol=1e-12)
 
@@ -229,8 +232,120 @@ def test_what_cannot_come_is_refused(
     with pytest.raises(SpecError, match=r"due 0\.05 s from now and needs 0\.2[0-9] s to come"):
         responder.hit(Ball(0.05))
     responder.hit(Ball(1.0))
-    with pytest.raises(SpecError, match=r"on its way until 1\.00 s from now"):
+    with pytest.raises(SpecError, match=r"may hit until 1\.20 s from now"):
         responder.hit(Ball(1.1))
-    responder.hit(Ball(1.5))
+    responder.hit(Ball(1.6))
+    # Nor while the first is in the air.
+    _run_until(crowd, Phase.APPROACH)
+    for another in (Push(0.0), Ball(0.25)):
+        with pytest.raises(SpecError, match="may hit until"):
+            responder.hit(another)
+    with pytest.raises(SpecError, match=r"at most 60 s from now, got 1e\+06"):
+        responder.hit(Push(1e6))
+    with pytest.raises(MotionError, match="at least one base motion"):
+        _crowd(character, library)
     with pytest.raises(MotionError, match="has 60 fps"):
         _crowd(character, library, walking(character, 1.0, fps=60.0))
+
+
+def test_a_second_hit_begins_where_the_first_has_come_to(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    (responder,) = crowd.responders
+    responder.hit(HARD)
+    _run_until(crowd, Phase.PHYSICS)
+    crowd.advance()
+    first = responder.flight
+    assert first is not None
+    assert first.trace is not None
+    assert first.choice is not None
+    now = responder.frame - first.launch
+    before, exit_frame = responder.pose, first.exit
+    responder.hit(Push(0.0, 900.0, 0.2, from_deg=90.0))
+    crowd.advance()
+    second = responder.flight
+    assert second is not None
+    assert second is not first
+    np.testing.assert_array_equal(second.setup.pose, before)
+    np.testing.assert_array_equal(second.setup.velocity, first.trace.velocities[now])
+    assert not second.setup.held
+    # What would go on is the choice under way, by the clock.
+    entry = first.choice.entry - (exit_frame - (first.launch + now))
+    entered = first.choice.motion.poses[max(entry, 0)]
+    np.testing.assert_allclose(second.base.poses[0, 7:], entered[7:], atol=1e-12)
+
+
+def test_a_hit_while_playing_is_held_and_begins_with_the_motions_own_velocity(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    crowd.responders[0].hit(HARD)
+    _run_until(crowd, Phase.APPROACH)
+    flight = crowd.responders[0].flight
+    assert flight is not None
+    assert flight.setup.held
+    np.testing.assert_allclose(flight.setup.velocity, base.velocities()[flight.launch], atol=1e-12)
+
+
+@pytest.mark.parametrize("phase", [Phase.APPROACH, Phase.PHYSICS])
+@pytest.mark.parametrize("second_pass", [False, True])
+def test_a_simulation_that_blows_up_takes_nobody_down(
+    character: Character,
+    library: ReactionLibrary,
+    base: Motion,
+    monkeypatch: pytest.MonkeyPatch,
+    phase: Phase,
+    second_pass: bool,
+) -> None:
+    """The state is spoilt while the hit is on its way, or before the rest is simulated."""
+    crowd = _crowd(character, library, base, base, second_pass=second_pass)
+    crowd.responders[0].hit(HARD)
+    original = Simulation.approach if phase is Phase.APPROACH else Simulation.track
+
+    def spoilt(self: Simulation, ids: Sequence[int], *rest: Any) -> None:
+        if phase is Phase.PHYSICS or self.frame(ids[0]) == 3:
+            self._batch.bind("qvel")[ids[0], :6] = 1e12
+        original(self, ids, *rest)
+
+    monkeypatch.setattr(Simulation, original.__name__, spoilt)
+    for _ in range(80):
+        crowd.advance()
+    assert EventKind.DIVERGED in _kinds(crowd.responders[0])
+    assert crowd.responders[0].phase is Phase.PLAYING
+    assert np.isfinite(crowd.shown().poses).all()
+    np.testing.assert_array_equal(crowd.shown(1).poses, base.poses[:81])
+    # And the next hit is answered.
+    monkeypatch.undo()
+    crowd.responders[0].hit(Ball(0.4, speed=12.0, mass=8.0))
+    for _ in range(40):
+        crowd.advance()
+    assert EventKind.CHOSEN in _kinds(crowd.responders[0])[-5:]
+
+
+def test_a_strike_by_a_second_character(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    crowd = _crowd(character, library, base)
+    crowd.responders[0].hit(Strike(1.5, punching(character), 0.6, target="chest"))
+    for _ in range(120):
+        crowd.advance()
+    assert EventKind.CHOSEN in _kinds(crowd.responders[0])
+    _is_continuous(crowd.shown())
+
+
+def test_a_character_that_has_played_for_long_is_hit_as_any(
+    character: Character, library: ReactionLibrary
+) -> None:
+    """What is past is not prepared again: here some minutes, in a game hours."""
+    crowd = _crowd(character, library, walking(character, 1.0))
+    (responder,) = crowd.responders
+    for _ in range(5_000):
+        crowd.advance()
+    responder.hit(HARD)
+    _run_until(crowd, Phase.APPROACH)
+    assert responder.flight is not None
+    assert len(responder.flight.base) < 300
+    for _ in range(40):
+        crowd.advance()
+    assert EventKind.CHOSEN in _kinds(responder)

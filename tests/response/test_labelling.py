@@ -10,6 +10,7 @@ from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Impact
 from dynresp.response.features import extract
+from dynresp.response.hits import HitStage
 from dynresp.response.labelling import OUTCOMES, Labelled, Labeller
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 
@@ -48,24 +49,15 @@ def test_labels_are_what_the_responder_chooses(
 
 
 def test_features_are_those_of_the_simulation(
-    character: Character, labelled: Labelled, responses: list[Response]
+    character: Character, labelled: Labelled, hits: list[tuple[Motion, Impact]]
 ) -> None:
-    """Until the exit a response shows the simulation itself."""
-    response = responses[1]
-    assert response.contact_frame is not None
-    seen = response.motion.poses[response.contact_frame :][None, :6]
-    rates = np.zeros((1, 6, 45))
-    features = extract(character, seen, rates, 30.0)[0]
-    places = np.isfinite(features)
-    still = [name.split("/")[2].startswith(("position", "orient")) for name in _names()]
-    both = places & np.array(still)
-    np.testing.assert_allclose(labelled.features[1][both], features[both], atol=1e-6)
-
-
-def _names() -> tuple[str, ...]:
-    from dynresp.response.features import FEATURE_NAMES
-
-    return FEATURE_NAMES
+    (batch,) = HitStage(character, ResponseConfig(), 1).batches(hits[1:2])
+    (trace,) = batch.simulation.look_ahead(0.6)
+    assert trace.contact is not None
+    first = trace.contact.frame
+    seen = extract(character, trace.poses[None, first:], trace.velocities[None, first:], 30.0)
+    assert np.isfinite(seen).all()
+    np.testing.assert_array_equal(labelled.features[1], seen[0])
 
 
 def test_a_miss_is_a_miss(labelled: Labelled) -> None:
