@@ -28,6 +28,9 @@ __all__ = ["Aligner", "Alignment", "AlignmentConfig", "Alignments"]
 _Clip = npt.NDArray[np.float32]
 
 _TRACE = "simulated trace"
+# Entries that are tried beside one that was shifted to a whole exit frame; itself first, so that of
+# equals it is kept.
+_NEARBY = np.array([0.0, -1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])
 
 
 class Aligner:
@@ -242,8 +245,8 @@ class Aligner:
     ) -> Alignment:
         """Move an alignment to a whole exit frame, where a simulation can be left.
 
-        Exit and entry are shifted together, to the frame before or after, whichever fits better;
-        the entry is held within its bounds.
+        Exit and entry are shifted together, to the frame before or after; the entry is then tried
+        up to a frame earlier and later, within its bounds, and what fits best is taken.
 
         Args:
             positions: (frames, bodies, 3), the trace that was aligned.
@@ -268,18 +271,17 @@ class Aligner:
                 f"the exit is at frame {alignment.exit_frame:g}, the trace has {len(position)} "
                 f"frames, so that it can be left at 0 to {last}. Give the trace that was aligned."
             )
-        shifted = [alignment.entry_frame + at - alignment.exit_frame for at in exits]
-        entries = [min(max(entry, earliest), earliest + room) for entry in shifted]
-        errors = self._errors(
-            position, quaternion, place, np.array(exits, float), np.array(entries, float)
-        )
+        ends = np.repeat(np.array(exits, float), len(_NEARBY))
+        shifted = alignment.entry_frame - alignment.exit_frame + ends
+        entries = np.clip(shifted + np.tile(_NEARBY, len(exits)), earliest, earliest + room)
+        errors = self._errors(position, quaternion, place, ends, entries)
         best = int(errors.argmin())
         return dataclasses.replace(
             alignment,
             error=float(errors[best]),
-            exit_frame=float(exits[best]),
+            exit_frame=float(ends[best]),
             entry_frame=float(entries[best]),
-            evaluations=alignment.evaluations + len(exits),
+            evaluations=alignment.evaluations + len(ends),
         )
 
     # -- laying out and checking ----------------------------------------------------------------

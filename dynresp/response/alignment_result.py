@@ -21,7 +21,9 @@ class AlignmentConfig:
             always sampled. The paper's ten frames at 120 a second.
         sets_without_gain: Sampling is cut after this many sets, each with all entries of one exit,
             that hold no better sample than those before. Fewer are faster and need less of the
-            simulation; as many as there are exits sample all.
+            simulation; as many as there are exits sample all. With two, the choices of a classifier
+            had twice the regret of those with three (1,000 hits, most of them the right reaction
+            at a moment up to 40 % worse); the third costs two microseconds.
         starts: From how many samples, none beside another, the descent begins; its best is taken.
         refine: Whether to descend at all; without it the best sample is taken.
         most_iterations: Steps of a descent, at most.
@@ -29,7 +31,7 @@ class AlignmentConfig:
     """
 
     step_s: float = 1.0 / 12.0
-    sets_without_gain: int = 2
+    sets_without_gain: int = 3
     starts: int = 1
     refine: bool = True
     most_iterations: int = 20

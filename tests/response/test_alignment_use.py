@@ -102,10 +102,16 @@ def test_snapping_shifts_exit_and_entry_together(seed: int) -> None:
     whole = aligner.snap(*trace, found)
     assert whole.exit_frame in (math.floor(found.exit_frame), math.ceil(found.exit_frame))
     shifted = found.entry_frame + whole.exit_frame - found.exit_frame
-    assert whole.entry_frame == pytest.approx(min(max(shifted, 0.0), 19.0))
+    shifted = min(max(shifted, 0.0), 19.0)
+    # The entry follows the exit, and is looked for again close by.
+    assert abs(whole.entry_frame - shifted) <= 1.0
+    there = aligner.errors(*trace, whole.reaction, whole.exit_frame, shifted)
+    assert whole.error <= float(there) + 1e-6
     own = aligner.errors(*trace, whole.reaction, whole.exit_frame, whole.entry_frame)
     assert whole.error == pytest.approx(float(own))
-    assert aligner.snap(*trace, whole).error == pytest.approx(whole.error)
+    again = aligner.snap(*trace, whole)
+    assert again.exit_frame == whole.exit_frame
+    assert again.error <= whole.error + 1e-6
 
 
 def test_snapping_takes_the_better_frame_and_holds_the_entry_in_its_bounds() -> None:
@@ -113,7 +119,7 @@ def test_snapping_takes_the_better_frame_and_holds_the_entry_in_its_bounds() -> 
     aligner = Aligner([track], WINDOW)
     found = Alignment("itself", 1.0, 6.2, 6.2, 0, 1, True, True)
     whole = aligner.snap(*trace, found)
-    assert (whole.exit_frame, whole.evaluations) == (6.0, 2)
+    assert (whole.exit_frame, whole.evaluations) == (6.0, 18)
     assert whole.entry_frame == pytest.approx(6.0)
     assert whole.error <= ERROR_FLOOR
     bounded = Aligner([dataclasses.replace(track, entry_range=(7, 12))], WINDOW)
