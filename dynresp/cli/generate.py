@@ -129,12 +129,17 @@ def _warn(manifest: Mapping[str, Any]) -> None:
             break
 
 
+def _counted(number: int, what: str) -> str:
+    many = what + ("es" if what.endswith("s") else "s")
+    return f"{number} {what if number == 1 else many}"
+
+
 def _told(content: dict[str, Any]) -> str:
     lines = [
-        f"{content['samples']} samples in {content['shards']} shards",
-        f"  outcomes   {content['hits']} hits, {content['misses']} misses, "
-        f"{content['diverged']} diverged",
-        f"  made       {content['shards_made']} shards"
+        f"{_counted(content['samples'], 'sample')} in {_counted(content['shards'], 'shard')}",
+        f"  outcomes   {_counted(content['hits'], 'hit')}, "
+        f"{_counted(content['misses'], 'miss')}, {content['diverged']} diverged",
+        f"  made       {_counted(content['shards_made'], 'shard')}"
         + (f", {content['shards_remade']} made again" if content["shards_remade"] else ""),
     ]
     if content["samples_per_s"] is not None:

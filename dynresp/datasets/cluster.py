@@ -7,6 +7,7 @@ asked, which alone writes. How a connection is made safe (TLS) is Dask's own con
 from __future__ import annotations
 
 import logging
+import queue
 import re
 import secrets
 import threading
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 # Shards in flight for each thread of the cluster, so that none waits for the next; and at least.
 _AHEAD, _LEAST = 2, 4
 _CONNECT_S = 20.0
+# Beyond that, for Dask to say itself why it could not connect.
+_GRACE_S = 1.0
 _LOOK_S = 0.5
 _ADDRESS = re.compile(r"(tcp|tls)://[^/\s]+:\d{1,5}")
 # Loaded once in each thread of a worker: a world is no thing for two threads at once.
@@ -53,7 +56,7 @@ def make_there(
         DynrespError: The scheduler cannot be reached or is gone; a worker could not do it; or too
             many workers died of one shard.
     """
-    security = _security(address)
+    security = connection_security(address)
     with _quiet():
         client = _connected(address, security)
         try:
@@ -65,12 +68,18 @@ def make_there(
                 client.close(timeout=2)
 
 
-def _security(address: str) -> Any:
-    """How Dask's configuration makes connections safe.
+def connection_security(address: str) -> Any:
+    """How Dask's configuration makes connections safe; nothing is connected yet.
+
+    Args:
+        address: Of the scheduler.
+
+    Returns:
+        Dask's `distributed.Security`.
 
     Raises:
         UsageError: Dask is not installed, the address is none, or it asks for TLS and the
-            configuration has no certificates for that.
+            configuration has no certificates for that, or names files that cannot be read.
     """
     try:
         from distributed.security import Security
@@ -86,6 +95,7 @@ def _security(address: str) -> Any:
         )
     try:
         security = Security()
+        _check_files(security)
         safe = security.get_connection_args("client").get("ssl_context") is not None
     except (OSError, ValueError, TypeError) as error:
         raise UsageError(f"Dask's configuration of TLS is wrong: {_short(error)}") from None
@@ -95,6 +105,28 @@ def _security(address: str) -> Any:
             "set distributed.comm.tls as docs/datasets.md says"
         )
     return security
+
+
+def _check_files(security: Any) -> None:
+    """Refuse certificates that cannot be read, by name: the errors of Python's ssl have none."""
+    places = {"ca_file": "ca-file", "cert": "client.cert", "key": "client.key"}
+    files = security.get_tls_config_for_role("client")
+    if not (files.get("ca_file") and files.get("cert")):
+        # Dask makes no use of one without the other.
+        return
+    for key, place in places.items():
+        path = files.get(key)
+        # What has several lines is the certificate itself.
+        if path is None or "\n" in path:
+            continue
+        try:
+            with open(path, "rb"):
+                pass
+        except OSError as error:
+            raise UsageError(
+                f"Dask's configuration of TLS is wrong: distributed.comm.tls.{place}: {path!r} "
+                f"cannot be read ({error.strerror})"
+            ) from None
 
 
 @contextmanager
@@ -114,13 +146,35 @@ def _quiet() -> Iterator[None]:
 def _connected(address: str, security: Any) -> Client:
     from distributed import Client
 
+    came: queue.SimpleQueue[Client | Exception] = queue.SimpleQueue()
+
+    def connect() -> None:
+        try:
+            client = Client(address, timeout=limit, set_as_default=False, security=security)
+        except Exception as error:
+            came.put(error)
+        else:
+            came.put(client)
+
+    # Dask bounds the wait for a connection, but not that for the first answer. So it waits in a
+    # thread, which is left to itself where no answer comes, and does not keep the program.
+    limit = _CONNECT_S
+    threading.Thread(target=connect, daemon=True).start()
     try:
-        return Client(address, timeout=_CONNECT_S, set_as_default=False, security=security)
-    except (OSError, ValueError, TypeError, RuntimeError) as error:
+        found = came.get(timeout=limit + _GRACE_S)
+    except queue.Empty:
         raise DynrespError(
-            f"--scheduler: no Dask scheduler can be reached at {address!r} ({_short(error)}); "
-            "start one with `dask scheduler`, and see docs/datasets.md for TLS"
+            f"--scheduler: what listens at {address!r} has not answered as a Dask scheduler does "
+            f"within {limit:g} s; see whether the address is right, and the scheduler is alive"
         ) from None
+    if isinstance(found, (OSError, ValueError, TypeError, RuntimeError)):
+        raise DynrespError(
+            f"--scheduler: no Dask scheduler can be reached at {address!r} ({_short(found)}); "
+            "start one with `dask scheduler`, and see docs/datasets.md for TLS"
+        )
+    if isinstance(found, Exception):
+        raise found
+    return found
 
 
 def _await_workers(client: Client, address: str, waiting: Callable[[], None]) -> None:
@@ -135,7 +189,7 @@ def _await_workers(client: Client, address: str, waiting: Callable[[], None]) ->
 def _threads(client: Client, address: str) -> int:
     """How many shards the cluster makes at once."""
     try:
-        found = client.nthreads()
+        found: dict[str, int] = client.sync(client.scheduler.ncores, callback_timeout=_CONNECT_S)
     except Exception:
         raise _gone(address) from None
     return sum(found.values())

@@ -13,7 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.facts import Facts, ManifestError, parse_facts, read_manifest
+from dynresp.datasets.facts import (
+    MAX_SHARD_SIZE,
+    Facts,
+    ManifestError,
+    parse_facts,
+    read_manifest,
+)
 from dynresp.datasets.manifest import MANIFEST, differences, told, write_manifest
 from dynresp.datasets.plan import Plan
 from dynresp.datasets.processes import cores, make_here
@@ -27,6 +33,7 @@ from dynresp.datasets.shards import (
     places,
     read_shard,
     shard_files,
+    stated,
 )
 from dynresp.datasets.work import Job, World
 from dynresp.errors import DynrespError, UsageError
@@ -110,20 +117,27 @@ def generate(
 
     Raises:
         UsageError: The folder holds another dataset, more samples than asked for, or cannot be
-            written.
+            written; or the scheduler's address or certificates are wrong.
         DynrespError: It could not be done. What has been made stays, and is gone on with.
     """
     tell = tell or (lambda stage, done, of: None)
+    if scheduler is not None:
+        from dynresp.datasets.cluster import connection_security
+
+        # Refused before motions are loaded, which takes a while.
+        connection_security(scheduler)
     with _locked(out):
         tell("loading motions", 0, plan.plan.count)
         world = World(plan, beside.resolve(), motions)
-        manifest = world.manifest(_shard_size(out, shard_size))
+        manifest = world.manifest(_shard_size(out, shard_size, world))
         there = _checked(out, manifest)
         if loaded is not None:
             loaded(manifest)
         facts = parse_facts(manifest)
         summary = Summary(out, shards=-(-facts.count // facts.shard_size))
-        wanted = _wanted(out, facts, summary, tell)
+        if there is None:
+            _refuse_fewer(out, facts)
+        wanted = _wanted(out, facts, summary, tell, known=there is not None)
         for path in left_over(out):
             path.unlink(missing_ok=True)
         # First of all, so that whatever is made is known to belong to it.
@@ -186,8 +200,14 @@ def _make(
             tell(stage, kept + summary.samples_made, facts.count)
 
 
-def _wanted(out: Path, facts: Facts, summary: Summary, tell: Tell) -> dict[Place, bool]:
-    """The shards that must be made, and whether each takes the place of a bad one."""
+def _wanted(
+    out: Path, facts: Facts, summary: Summary, tell: Tell, known: bool
+) -> dict[Place, bool]:
+    """The shards that must be made, and whether each takes the place of a bad one.
+
+    Where it is known from its manifest that the folder is this dataset's, a shard of another one
+    is a bad one, too.
+    """
     wanted = {}
     there = shard_files(out)
     all_places = places(facts.identity, facts.count, facts.shard_size)
@@ -206,12 +226,12 @@ def _wanted(out: Path, facts: Facts, summary: Summary, tell: Tell) -> dict[Place
             columns = read_shard(out, facts.layout, place)
             facts.check(columns, place.name)
             _count(columns, facts, summary)
-        except ForeignShardError as error:
-            raise UsageError(
-                f"{error}; name another folder, give the --shard-size that it was made with, or "
-                "remove its shards"
-            ) from None
-        except ShardError:
+        except ShardError as error:
+            if isinstance(error, ForeignShardError) and not known:
+                raise UsageError(
+                    f"{error}; name another folder, give the --shard-size that it was made with, "
+                    "or remove its shards"
+                ) from None
             wanted[place] = True
     return wanted
 
@@ -223,14 +243,40 @@ def _count(columns: Columns, facts: Facts, summary: Summary) -> None:
     summary.samples += len(columns["index"])
 
 
-def _shard_size(out: Path, asked: int | None) -> int:
+def _refuse_fewer(out: Path, facts: Facts) -> None:
+    """Refuse fewer samples than there are where no manifest says how many: the shards do."""
+    most = max((p.first + p.rows for p in stated(out) if p.identity == facts.identity), default=0)
+    if most > facts.count:
+        raise _fewer(out, most, facts.count, "at least ")
+
+
+def _fewer(out: Path, there: int, asked: int, how: str = "") -> UsageError:
+    return UsageError(
+        f"{out} holds a dataset of {how}{there} samples, and {asked} were asked for; give --count "
+        f"{there} or more, or name another folder"
+    )
+
+
+def _shard_size(out: Path, asked: int | None, world: World) -> int:
     """The size that a begun dataset has, or the one that is asked for."""
     if asked is not None:
         return asked
     try:
         return int(read_manifest(out)["shard_size"])
     except (ManifestError, UsageError):
-        return SHARD_SIZE
+        pass
+    tried = set()
+    for place in stated(out):
+        # Of the first shard alone it cannot be said whether it is full; the identity, in which
+        # the size is, decides.
+        sizes = (place.first // place.number,) if place.number else (SHARD_SIZE, place.rows)
+        for size in sizes:
+            if not 1 <= size <= MAX_SHARD_SIZE or (place.identity, size) in tried:
+                continue
+            tried.add((place.identity, size))
+            if world.manifest(size)["identity"] == place.identity:
+                return size
+    return SHARD_SIZE
 
 
 def _checked(out: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -249,24 +295,36 @@ def _checked(out: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
             "give what it was made with."
         )
     if there["count"] > manifest["count"]:
-        raise UsageError(
-            f"{out} holds a dataset of {there['count']} samples, and {manifest['count']} were "
-            f"asked for; give --count {there['count']} or more, or name another folder"
-        )
+        raise _fewer(out, there["count"], manifest["count"])
     return there
 
 
 @contextmanager
 def _locked(out: Path) -> Iterator[None]:
-    """Make the folder, and keep others from writing to it at the same time."""
+    """Make the folder, and keep others from writing to it at the same time.
+
+    Folders that it has made go again where nothing was put into them.
+    """
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out: {str(out)!r} is a file; expected a folder for the dataset")
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"--out: {str(out)!r} cannot be made ({error.strerror}); choose another folder"
-        ) from None
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(
+                f"--out: {str(out)!r} cannot be made ({error.strerror}); choose another folder"
+            ) from None
+        with _alone(out):
+            yield
+    finally:
+        with suppress(OSError):
+            for folder in new:
+                folder.rmdir()
+
+
+@contextmanager
+def _alone(out: Path) -> Iterator[None]:
     if not os.access(out, os.W_OK | os.X_OK):
         raise UsageError(f"--out: {str(out)!r} cannot be written; choose another folder")
     try:

@@ -24,6 +24,9 @@ from dynresp.errors import DynrespError
 MAX_DEATHS = 3
 """A shard that so many workers died of is given up."""
 
+MAX_FALSE_STARTS = 10
+"""As many workers, or three times the team, may die one after another before any has begun."""
+
 # Libraries that would start threads of their own, and these would wait for each other.
 _ONE_THREAD = (
     "OMP_NUM_THREADS",
@@ -40,6 +43,7 @@ class _Worker:
     process: SpawnProcess
     pipe: Connection
     place: Place | None = None
+    begun: bool = False
     done: int = 0
 
 
@@ -69,6 +73,7 @@ def make_here(
     """
     waiting = deque(wanted)
     deaths: Counter[int] = Counter()
+    false_starts = 0
     team: list[_Worker] = []
     left = len(wanted)
     try:
@@ -82,13 +87,17 @@ def make_here(
                     kind, *content = worker.pipe.recv()
                 except (EOFError, OSError):
                     team.remove(worker)
-                    _mourn(worker, waiting, deaths)
+                    false_starts = 0 if worker.begun else false_starts + 1
+                    _mourn(worker, waiting, deaths, false_starts, workers)
                     if waiting:
                         team.append(_hired(job))
                         _next(team[-1], waiting)
                     continue
                 if kind == "error":
                     raise DynrespError(content[0])
+                if kind == "begun":
+                    worker.begun, false_starts = True, 0
+                    continue
                 if kind == "done":
                     worker.done = content[0]
                     progress(sum(w.done for w in team))
@@ -106,23 +115,40 @@ def make_here(
 def _next(worker: _Worker, waiting: deque[Place]) -> None:
     """Give a worker its next shard, where there is one."""
     worker.place = waiting.popleft() if waiting else None
+    worker.begun = False
     if worker.place is not None:
         # One that has died is noticed where its pipe is read.
         with suppress(OSError):
             worker.pipe.send(worker.place)
 
 
-def _mourn(worker: _Worker, waiting: deque[Place], deaths: Counter[int]) -> None:
-    """Put a dead worker's shard back, unless it has killed too many."""
+def _mourn(
+    worker: _Worker,
+    waiting: deque[Place],
+    deaths: Counter[int],
+    false_starts: int,
+    workers: int,
+) -> None:
+    """Put a dead worker's shard back, unless it has killed too many.
+
+    A worker that died before it began with its shard, while it loaded, did not die of it. Where
+    none gets further than that, something is wrong with all.
+    """
     worker.process.join(_STOP_S)
     code = worker.process.exitcode
     _dismissed(worker)
     place = worker.place
     if place is None:
         return
-    deaths[place.number] += 1
+    how = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+    deaths[place.number] += worker.begun
+    if false_starts >= max(MAX_FALSE_STARTS, 3 * workers):
+        raise DynrespError(
+            f"{false_starts} worker processes died one after another before they began ({how}); "
+            "see whether dynresp is wholly installed, and where memory is short, give fewer "
+            "--workers. Nothing is lost: the same command goes on."
+        )
     if deaths[place.number] >= MAX_DEATHS:
-        how = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
         raise DynrespError(
             f"{MAX_DEATHS} worker processes died while making shard {place.number} ({how}); where "
             "memory is short, give fewer --workers. Nothing is lost: the same command goes on."
@@ -183,6 +209,7 @@ def _work(job: Job, pipe: Connection) -> None:
             world = load(job)
             while True:
                 place: Place = pipe.recv()
+                tell("begun")
                 tell("made", world.make(place, lambda done: tell("done", done)))
         except DynrespError as error:
             tell("error", str(error))

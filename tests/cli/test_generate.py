@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.cli.generate import _duration, _pace, _paced
+from dynresp.cli.generate import _duration, _pace, _paced, _told
 
 from ..datasets.samples import files, write_plan
 from .conftest import Command
@@ -53,14 +53,21 @@ def test_a_dataset_from_a_plan(plan: Path, tmp_path: Path, dynresp: Command) -> 
     assert files(out) == before
 
 
-def test_built_in_motions_that_stand_in_are_told(tmp_path: Path, dynresp: Command) -> None:
+def test_built_in_motions_that_stand_in_are_told(
+    tmp_path: Path, dynresp: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dynresp.datasets import generate as making
+    from dynresp.errors import DynrespError
+
+    def stopped(*given: object) -> None:
+        raise DynrespError("stopped")
+
     plan = write_plan(tmp_path)
     text = plan.read_text(encoding="utf-8").replace('which = "builtin"', 'which = "core"')
     plan.write_text(text.replace('"builtin:walk"', '"walk.bvh"\nor = "builtin:walk"'), "utf-8")
-    # Stopped before anything is made: no worker can be had.
-    words = ("--motions", tmp_path, "--scheduler", "nowhere")
-    result = dynresp("generate", plan, "--out", tmp_path / "out", *words)
-    assert result.exit_code == 2
+    monkeypatch.setattr(making, "_make", stopped)
+    result = dynresp("generate", plan, "--out", tmp_path / "out", "--motions", tmp_path)
+    assert result.exit_code == 1
     assert (
         "built-in motions stand in for motion capture that is not on this machine "
         "(walk.bvh, core)" in result.stderr
@@ -86,6 +93,17 @@ def test_asking_wrongly_is_said(
     assert result.stdout == ""
     assert said in result.stderr
     assert "Traceback" not in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_is_no_plural() -> None:
+    content = {"samples": 1, "shards": 1, "hits": 0, "misses": 1, "diverged": 0, "shards_made": 1,
+               "shards_remade": 0, "samples_per_s": None, "folder": "out"}  # fmt: skip
+    assert _told(content).splitlines()[:3] == [
+        "1 sample in 1 shard",
+        "  outcomes   0 hits, 1 miss, 0 diverged",
+        "  made       1 shard",
+    ]
 
 
 def test_a_wrong_plan_says_which_key(plan: Path, tmp_path: Path, dynresp: Command) -> None:

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -200,3 +201,29 @@ def test_nobody_listens(monkeypatch: pytest.MonkeyPatch) -> None:
     job = Job(plan(), Path(), None, {})
     with pytest.raises(DynrespError, match="no Dask scheduler can be reached"):
         next(cluster.make_there(job, places("x", 1, 1), "tcp://127.0.0.1:1", lambda: None))
+
+
+@pytest.mark.slow
+def test_what_accepts_and_never_answers(words: list[object]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        begun = time.monotonic()
+        done = ran(*words, "--scheduler", f"tcp://127.0.0.1:{mute.getsockname()[1]}")
+        took = time.monotonic() - begun
+    assert done.returncode == 1
+    assert "has not answered as a Dask scheduler does within 20 s" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert took < 60.0
+
+
+@pytest.mark.parametrize("missing", ["ca-file", "client.cert", "client.key"])
+def test_a_missing_certificate_is_named(tmp_path: Path, missing: str) -> None:
+    import dask.config
+
+    there = tmp_path / "there.pem"
+    there.touch()
+    names = ("ca-file", "client.cert", "client.key")
+    paths = {f"distributed.comm.tls.{name}": str(there) for name in names}
+    paths[f"distributed.comm.tls.{missing}"] = str(tmp_path / "gone.pem")
+    with dask.config.set(paths):
+        said = refused("tls://127.0.0.1:1")
+    assert f"distributed.comm.tls.{missing}: '{tmp_path / 'gone.pem'}' cannot be read" in said

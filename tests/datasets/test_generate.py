@@ -144,9 +144,81 @@ def test_a_smaller_count_is_refused(copied: Path, dataset: Path) -> None:
     with pytest.raises(UsageError, match="holds a dataset of 20 samples, and 13 were asked for"):
         run(copied, plan(count=13))
     (copied / MANIFEST).unlink()
-    with pytest.raises(UsageError, match="holds more than the 13 samples"):
+    with pytest.raises(UsageError, match="of at least 20 samples, and 13 were asked for"):
         run(copied, plan(count=13), shard_size=8)
     assert (copied / "shard-00002.parquet").exists()
+    (copied / "shard-00002.parquet").write_bytes(b"")
+    with pytest.raises(UsageError, match="holds more than the 16 samples"):
+        run(copied, plan(count=16), shard_size=8)
+
+
+@pytest.mark.parametrize("size", [None, 8])
+def test_a_smaller_last_shard_is_refused_without_a_manifest(
+    copied: Path, dataset: Path, size: int | None
+) -> None:
+    (copied / MANIFEST).write_bytes(b"{")
+    with pytest.raises(UsageError, match="give --count 20 or more"):
+        run(copied, plan(count=17), shard_size=size)
+    assert (copied / "shard-00002.parquet").read_bytes() == (
+        dataset / "shard-00002.parquet"
+    ).read_bytes()
+
+
+@pytest.mark.parametrize("size", [8, 20, 500])
+@pytest.mark.parametrize("damage", [lambda p: p.write_bytes(b"{"), Path.unlink])
+def test_shards_without_a_manifest_say_their_size(
+    tmp_path: Path,
+    made_in_this_process: list[int],
+    size: int,
+    damage: Callable[[Path], Any],
+) -> None:
+    out = tmp_path / "out"
+    run(out, shard_size=size)
+    before = files(out)
+    made_in_this_process.clear()
+    damage(out / MANIFEST)
+    run(out)
+    assert made_in_this_process == []
+    assert files(out) == before
+
+
+def test_a_foreign_shard_is_made_again_where_the_manifest_is_whole(
+    copied: Path, dataset: Path, tmp_path: Path, made_in_this_process: list[int]
+) -> None:
+    other = tmp_path / "other"
+    run(other, plan(seed=6), shard_size=8)
+    made_in_this_process.clear()
+    shutil.copy(other / "shard-00001.parquet", copied)
+    foreign = files(copied)
+    assert run(copied).remade == 1
+    assert made_in_this_process == [1]
+    assert files(copied) == files(dataset)
+    # What a folder without a manifest is, its shards must agree upon.
+    shutil.copy(other / "shard-00001.parquet", copied)
+    (copied / MANIFEST).write_bytes(b"{")
+    with pytest.raises(UsageError, match=r"shard-00001\.parquet: a shard of another dataset"):
+        run(copied)
+    assert files(copied) == {**foreign, MANIFEST: b"{"}
+
+
+def test_folders_made_in_vain_go_again(tmp_path: Path) -> None:
+    out = tmp_path / "a" / "b"
+    with pytest.raises(UsageError, match="does not exist"):
+        generate(plan(seed=7), tmp_path, out, motions=tmp_path / "none")
+    assert not out.parent.exists()
+    out.mkdir(parents=True)
+    with pytest.raises(UsageError, match="does not exist"):
+        generate(plan(seed=7), tmp_path, out, motions=tmp_path / "none")
+    assert out.exists()
+
+
+def test_a_wrong_address_is_refused_before_anything(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    told: list[str] = []
+    with pytest.raises(UsageError, match="expected an address such as"):
+        run(tmp_path / "out", scheduler="foo", tell=lambda stage, *_: told.append(stage))
+    assert told == []
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

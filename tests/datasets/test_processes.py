@@ -28,6 +28,10 @@ def quick(job: Any, pipe: Connection) -> None:
         except EOFError:
             return
         mark = marks / f"{place.number}"
+        if place.identity == "kills while loading" and len(list(marks.iterdir())) < 7:
+            (marks / str(os.getpid())).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        pipe.send(("begun",))
         if place.identity == "kills once" and place.number == 2 and not mark.exists():
             mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -78,11 +82,18 @@ def test_a_shard_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     assert "the same command goes on" in str(caught.value)
 
 
+@pytest.mark.usefixtures("stand_in")
+def test_deaths_before_a_worker_begins_do_not_count_against_a_shard(tmp_path: Path) -> None:
+    assert sorted(collected(tmp_path, "kills while loading")) == [0, 1, 2, 3, 4]
+    assert len(list(tmp_path.iterdir())) >= 7
+
+
 def test_workers_that_die_at_once_are_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(processes, "_work", dies_at_once)
-    with pytest.raises(DynrespError, match="worker processes died"):
+    said = r"10 worker processes died one after another before they began \(exit code 3\)"
+    with pytest.raises(DynrespError, match=said):
         collected(tmp_path, "x")
 
 
