@@ -88,10 +88,6 @@ class Dataset:
         parameters = {name: array[rows] for name, array in self.parameters.items()}
         return replace(self, **taken, parameters=parameters)  # type: ignore[arg-type]
 
-    def hits(self) -> Dataset:
-        """The samples in which something was hit."""
-        return self.take(self.outcome == self.facts.outcomes.index(HIT))
-
     def _arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         names = [item.name for item in fields(self) if item.name not in ("facts", "parameters")]
         return {name: getattr(self, name) for name in names}

@@ -17,7 +17,7 @@ from types import ModuleType
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError, UnknownNameError, UsageError
+from dynresp.errors import MotionError, UnknownNameError
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.alignment_result import Alignment, AlignmentConfig, Alignments
 from dynresp.response.window_config import WindowErrorConfig
@@ -38,7 +38,7 @@ class Aligner:
 
     To fit a trace that grows with the simulation, align what is there and go on simulating while
     the result is not `complete`: a longer trace leaves a complete result as it is, to the last
-    bit. `frames_needed` tells which lengths are worth a try.
+    bit.
 
     Making one costs some tens of microseconds a reaction, so a track that is met once, such as
     the base motion around the hit, can have an aligner of its own.
@@ -95,11 +95,6 @@ class Aligner:
         )
         self._clips.flags.writeable = self._places.flags.writeable = False
 
-    @property
-    def sets(self) -> int:
-        """Sets of samples, where none are left out."""
-        return len(self._exits)
-
     def row(self, reaction: str) -> int:
         """Index of a reaction in `names`.
 
@@ -109,19 +104,6 @@ class Aligner:
         if reaction not in self._rows:
             raise UnknownNameError("reaction", reaction, self.names)
         return self._rows[reaction]
-
-    def frames_needed(self, sets: int) -> int:
-        """Frames from contact on that a trace must have for so many sets of samples.
-
-        Args:
-            sets: 1 to `sets`.
-
-        Raises:
-            UsageError: There are not so many.
-        """
-        if not 1 <= sets <= self.sets:
-            raise UsageError(f"sets is {sets}; expected 1 to {self.sets}.")
-        return math.ceil(self._exits[sets - 1]) + self.window.window_frames
 
     def align(
         self, positions: npt.ArrayLike, quaternions: npt.ArrayLike, reactions: Sequence[str]

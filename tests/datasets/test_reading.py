@@ -65,8 +65,9 @@ def test_parts_of_it(dataset: Path) -> None:
     assert some.index.tolist() == [3, 1]
     assert np.array_equal(some.parameters["phase"], data.parameters["phase"][[3, 1]])
     hits = load_dataset(dataset, hits_only=True)
-    assert np.array_equal(hits.index, data.hits().index)
-    assert np.array_equal(hits.features, data.hits().features)
+    hit = data.outcome == data.facts.outcomes.index("hit")
+    assert np.array_equal(hits.index, data.index[hit])
+    assert np.array_equal(hits.features, data.features[hit])
     with pytest.raises(UsageError, match="limit: expected at least 1"):
         load_dataset(dataset, limit=0)
 

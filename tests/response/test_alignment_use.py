@@ -42,13 +42,13 @@ def test_a_trace_may_grow_until_the_search_is_complete() -> None:
         aligner = Aligner(reactions(seed + 10), WINDOW)
         trace = smooth_track(seed)
         whole = align_one(aligner, trace)
-        for sets in range(1, aligner.sets + 1):
-            frames = aligner.frames_needed(sets)
+        # Exits 2, 4.5, 7, 9.5, 12 and windows of 5 frames.
+        for sets, frames in enumerate((7, 10, 12, 15, 17), 1):
             part = align_one(aligner, (trace[0][:frames], trace[1][:frames]))
             assert part.sets <= sets
             if part.complete:
                 assert part == whole
-                complete += sets < aligner.sets
+                complete += sets < 5
                 break
             assert part.sets == sets < whole.sets
             assert part.exit_frame <= frames - WINDOW.window_frames
@@ -65,16 +65,6 @@ def test_what_a_trace_holds_after_the_last_window_is_not_looked_at() -> None:
     whole = align_one(aligner, (trace[0][:FRAMES], trace[1][:FRAMES]))
     trace[0][FRAMES:] = math.nan
     assert align_one(aligner, trace) == whole
-
-
-def test_frames_needed_by_sets() -> None:
-    aligner = Aligner(reactions(2), WINDOW)
-    # Exits 2, 4.5, 7, 9.5, 12 and windows of 5 frames.
-    assert [aligner.frames_needed(sets) for sets in range(1, aligner.sets + 1)] == [
-        *(7, 10, 12, 15, 17)
-    ]
-    with pytest.raises(UsageError, match="sets is 6; expected 1 to 5"):
-        aligner.frames_needed(6)
 
 
 def test_one_exit_and_few_entries() -> None:
