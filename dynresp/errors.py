@@ -53,6 +53,10 @@ class MissingMotionDataError(DynrespError):
     """Motion files that are needed are not on this machine; the message says how to get them."""
 
 
+class GraphFileError(UsageError):
+    """A motion graph's file that cannot be read: damaged, of another format, or out of bounds."""
+
+
 class FetchError(DynrespError):
     """Motion data could not be fetched or failed its checksum."""
 

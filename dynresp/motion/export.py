@@ -13,15 +13,14 @@ and readers which do not agree. Rotation channels are in the order Z X Y: R = Rz
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from dynresp.archive import text_array
 from dynresp.errors import MotionError
 from dynresp.files import replacing
 from dynresp.motion import rotations
@@ -37,7 +36,6 @@ _DIGITS = 6
 # Below this length the direction of a pair of numbers is noise: the pose is at a gimbal's pole.
 _NO_DIRECTION = 1e-9
 # Zip archives cannot be older; any fixed time would do.
-_ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def write_npz(motion: Motion, path: str | Path, character: Character) -> None:
@@ -54,8 +52,7 @@ def write_npz(motion: Motion, path: str | Path, character: Character) -> None:
     """
     names = [label.name for label in motion.labels]
     ranges = [(label.start, label.stop) for label in motion.labels]
-    arrays: dict[str, npt.NDArray[Any]] = {
-        "format_version": np.array(npz.FORMAT_VERSION, dtype="<i8"),
+    arrays = {
         "character": _texts(character.identity),
         "name": _texts(motion.name),
         "fps": np.array(motion.fps, dtype="<f8"),
@@ -65,16 +62,10 @@ def write_npz(motion: Motion, path: str | Path, character: Character) -> None:
         "label_ranges": np.array(ranges, dtype="<i8").reshape(-1, 2),
     }
     for name, array in arrays.items():
-        problem = npz.member_problem(name, array.dtype.str, array.shape)
+        problem = npz.FORMAT.problem(name, array.dtype.str, array.shape)
         if problem:
             raise MotionError(f"motion {motion.name[:80]!r} does not fit a .npz file: {problem}")
-    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-        for name, array in arrays.items():
-            # Stored, since packed bytes depend on the zlib at hand, and poses hardly shrink.
-            info = zipfile.ZipInfo(f"{name}.npy", date_time=_ZIP_TIME)
-            info.create_system = 3
-            with archive.open(info, "w") as member:
-                np.lib.format.write_array(member, array, version=(1, 0), allow_pickle=False)
+    npz.FORMAT.write(path, arrays)
 
 
 def write_bvh(motion: Motion, path: str | Path, character: Character) -> None:
@@ -194,7 +185,7 @@ def _texts(text: str | list[str]) -> npt.NDArray[np.str_]:
     Raises:
         MotionError: A name ends in a null character, which a fixed width cannot keep.
     """
-    array = np.array(text, dtype=np.str_)
+    array = text_array(text)
     if array.tolist() != text:
         raise MotionError(f"names must not end in a null character: {text!r}")
-    return array.astype(array.dtype.newbyteorder("<"))
+    return array
