@@ -1,0 +1,90 @@
+"""Settings of a motion graph."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from dynresp.errors import UsageError
+
+
+class Coordinates(Enum):
+    """In what world frames are compared (Lee et al. 2002, section 4.1.2)."""
+
+    RELATIVE = "relative"
+    """Anywhere on level ground, facing anywhere: position on the ground and yaw do not count."""
+    FIXED = "fixed"
+    """In the world of the recording, where things stand in their places."""
+    BLOCKS = "blocks"
+    """On a grid of blocks: whole blocks along and up, and quarter turns, do not count."""
+
+
+@dataclass(frozen=True)
+class GraphConfig:
+    """How a motion graph is made.
+
+    Attributes:
+        fps: Frame rate of its frames [1/s]; the paper's is 15.
+        mirrored: Whether the mirror image of every motion belongs to it.
+        coordinates: In what world frames are compared.
+        contact_change: Whether jumps are allowed only where a contact begins or ends, the strict
+            form of the first pruning rule.
+        sigma: Distance at which the probability has fallen to 1/e (eq. 1).
+        least_probability: Jumps with exp(-D / sigma) below it are dropped, the second rule.
+        velocity_weight: Weight of squared velocity differences against squared half-angle
+            differences (nu of eq. 2).
+        local_maxima: Whether of neighbouring jumps only the best stays, the third rule. None
+            does what the paper does: not where contact_change already leaves single ones.
+        stutter_s: Jumps within a clip that skip or repeat less than this are none [s].
+        blend_s: Time over which a jump is blended [s]; 1 to 2 in the paper.
+        block_m: Side of a block [m], of `Coordinates.BLOCKS`.
+        block_height_m: Its height [m].
+    """
+
+    fps: float = 15.0
+    mirrored: bool = False
+    coordinates: Coordinates = Coordinates.RELATIVE
+    contact_change: bool = True
+    sigma: float = 0.1
+    least_probability: float = 0.05
+    velocity_weight: float = 0.01
+    local_maxima: bool | None = None
+    stutter_s: float = 0.25
+    blend_s: float = 1.0
+    block_m: float = 0.6096
+    block_height_m: float = 0.1905
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            UsageError: One of them makes no sense.
+        """
+        for name in ("fps", "sigma", "blend_s", "block_m", "block_height_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise UsageError(f"{name} must be above 0, got {value}")
+        for name in ("velocity_weight", "stutter_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise UsageError(f"{name} must be 0 or more, got {value}")
+        if not 0 < self.least_probability < 1:
+            raise UsageError(
+                f"least_probability must be between 0 and 1, got {self.least_probability}"
+            )
+        if self.mirrored and self.coordinates is Coordinates.FIXED:
+            raise UsageError(
+                "mirrored motion in fixed coordinates would stand in a mirrored world; "
+                "use relative coordinates, or leave mirrored out"
+            )
+
+    @property
+    def keeps_local_maxima(self) -> bool:
+        """Whether the third rule is in force."""
+        return not self.contact_change if self.local_maxima is None else self.local_maxima
+
+    @property
+    def farthest(self) -> float:
+        """Largest distance of a jump that the second rule keeps."""
+        return -self.sigma * math.log(self.least_probability)
