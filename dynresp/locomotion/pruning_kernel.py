@@ -1,0 +1,58 @@
+"""The compiled third pruning rule: local maxima of the transition matrix.
+
+Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
+is used.
+"""
+
+from __future__ import annotations
+
+from numba import types
+
+from dynresp.compiling import compiled
+
+_SIGNATURE = types.void(
+    types.int64,
+    types.Array(types.int64, 1, "C", readonly=True),
+    types.Array(types.int32, 1, "C", readonly=True),
+    types.Array(types.float32, 1, "C", readonly=True),
+    types.Array(types.int32, 1, "C", readonly=True),
+    types.boolean[::1],
+)
+
+
+@compiled(_SIGNATURE)
+def keep_best_of_neighbours(first, offsets, columns, distances, clip_of, keep):  # type: ignore[no-untyped-def]
+    """Mark the pairs that no neighbour in the matrix surpasses.
+
+    Neighbours of (i, j) are the up to eight pairs (i', j') among those given with |i' - i| <= 1
+    and |j' - j| <= 1, frames of the same clips. A neighbour surpasses with a smaller distance, or
+    with the same distance and an earlier place (i', j') < (i, j).
+
+    Args:
+        first: Frame of the first row.
+        offsets: (rows + 1,) where rows begin.
+        columns: (pairs,) frames j, ascending in a row.
+        distances: (pairs,).
+        clip_of: (n,) clip of each frame.
+        keep: (pairs,) out.
+    """
+    rows = len(offsets) - 1
+    keep[:] = True
+    for r in range(rows):
+        i = first + r
+        for other in range(max(r - 1, 0), min(r + 2, rows)):
+            if clip_of[first + other] != clip_of[i]:
+                continue
+            at, stop = offsets[other], offsets[other + 1]
+            for pair in range(offsets[r], offsets[r + 1]):
+                j = columns[pair]
+                while at < stop and columns[at] < j - 1:
+                    at += 1
+                near = at
+                while near < stop and columns[near] <= j + 1:
+                    is_earlier = other < r or (other == r and columns[near] < j)
+                    closer = distances[near] < distances[pair]
+                    level = distances[near] == distances[pair]
+                    if clip_of[columns[near]] == clip_of[j] and (closer or (level and is_earlier)):
+                        keep[pair] = False
+                    near += 1
