@@ -1,8 +1,9 @@
 """Frames of a graph played as one continuous motion: displacement mapping (section 4.1.1).
 
 After a jump from frame i to frame j the recorded motion is displaced so that pose and velocity at
-frame j - 1 are those played at frame i; the displacement decays to nothing over the blend. The pose
-played at i holds what is left of earlier displacements, so blends may overlap.
+frame j - 1 are those played at frame i; the displacement decays to nothing over the blend, and what
+the difference in velocity adds to it over a shorter time. The pose played at i holds what is left
+of earlier displacements, so blends may overlap.
 """
 
 from __future__ import annotations
@@ -111,6 +112,7 @@ class Playback:
         poses, placements = np.empty((len(entered), 59)), np.empty((len(entered), 4))
         play_kernel(
             database.poses, database.velocities, path, jumps, moves, database.fps, config.blend_s,
+            config.blend_rate_s,
             self.place, self._offset, self._rate, self._age, poses, placements,
         )  # fmt: skip
         self.frame = int(path[-1])

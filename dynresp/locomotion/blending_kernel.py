@@ -20,7 +20,7 @@ _OUT = types.float64[:, ::1]
 _STATE = types.float64[::1]
 _DISPLACE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _STATE, _STATE)
 _PLAY = types.void(
-    _ROWS, _ROWS, _FRAMES, _FLAGS, _ROWS, types.float64, types.float64,
+    _ROWS, _ROWS, _FRAMES, _FLAGS, _ROWS, types.float64, types.float64, types.float64,
     _STATE, _STATE, _STATE, _STATE, _OUT, _OUT,
 )  # fmt: skip
 
@@ -78,13 +78,13 @@ def _move(place, dx, dy, dz, turn):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _decay(offset, rate, age, blend_s):  # type: ignore[no-untyped-def]
-    """Bring a displacement and its rate to what they are at an age: a cubic that ends at rest."""
-    s = min(age / blend_s, 1.0)
+def _decay(offset, rate, age, blend_s, rate_s):  # type: ignore[no-untyped-def]
+    """Bring a displacement and its rate to what they are at an age: cubics that end at rest."""
+    s, u = min(age / blend_s, 1.0), min(age / rate_s, 1.0)
     from_offset = (2.0 * s - 3.0) * s * s + 1.0
-    from_rate = ((s - 2.0) * s + 1.0) * s * blend_s
     slope_of_offset = 6.0 * (s - 1.0) * s / blend_s
-    slope_of_rate = (3.0 * s - 4.0) * s + 1.0
+    from_rate = ((u - 2.0) * u + 1.0) * u * rate_s
+    slope_of_rate = (3.0 * u - 4.0) * u + 1.0
     for i in range(45):
         o, r = offset[i], rate[i]
         offset[i] = from_offset * o + from_rate * r
@@ -148,7 +148,7 @@ def displacement_kernel(  # type: ignore[no-untyped-def]
 
 @compiled(_PLAY)
 def play_kernel(  # type: ignore[no-untyped-def]
-    poses, velocities, frames, jumps, moves, fps, blend_s,
+    poses, velocities, frames, jumps, moves, fps, blend_s, rate_s,
     place, offset, rate, age, played, placements,
 ):  # fmt: skip
     """Write the poses of a walk; the state goes on from one call to the next.
@@ -161,6 +161,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
         moves: (k, 4) where the clip of each is put, seen from the clip before; read at jumps.
         fps: Frame rate.
         blend_s: Time over which a displacement decays [s].
+        rate_s: Time over which its rate does, at most as long.
         place: In and out, (4,) where the clip is put.
         offset: In and out, (45,) displacement at the last jump; see `displacement_kernel`.
         rate: In and out, (45,) its rate of change then.
@@ -177,7 +178,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
             # there counts, so that blends overlap.
             left = frames[k]
             now[:], its_rate[:] = offset, rate
-            _decay(now, its_rate, age[0], blend_s)
+            _decay(now, its_rate, age[0], blend_s, rate_s)
             _put(poses[left], place, now, pose)
             cosine, sine = math.cos(place[3]), math.sin(place[3])
             v = velocities[left]
@@ -191,7 +192,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
         age[0] += 1.0 / fps
         if age[0] < blend_s:
             now[:], its_rate[:] = offset, rate
-            _decay(now, its_rate, age[0], blend_s)
+            _decay(now, its_rate, age[0], blend_s, rate_s)
         else:
             now[:] = 0.0
         _put(poses[frame], place, now, played[k])

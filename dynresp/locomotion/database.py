@@ -52,6 +52,7 @@ class MotionDatabase:
         fps: Frames per second.
         clips: The clips, in the order of their frames.
         character: `Character.identity` of the character.
+        credits: To whom the motions are owed, a line each.
 
     Raises:
         MotionError: Shapes do not fit together, or there is no frame.
@@ -62,6 +63,7 @@ class MotionDatabase:
     fps: float
     clips: tuple[Clip, ...]
     character: str
+    credits: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check and freeze the arrays."""
@@ -88,6 +90,7 @@ class MotionDatabase:
         fps: float = 15.0,
         mirrored: bool = False,
         contacts: Sequence[BoolArray] | None = None,
+        credits: tuple[str, ...] = (),
     ) -> MotionDatabase:
         """Bring motions to one frame rate and lay them end to end.
 
@@ -101,6 +104,7 @@ class MotionDatabase:
             mirrored: Whether every motion is followed by its mirror image.
             contacts: For each motion (frames, 2 or 4) what touches the environment, at the
                 motion's own rate; by default the motions' foot contacts.
+            credits: To whom they are owed, a line each.
 
         Raises:
             MotionError: There is no motion long enough.
@@ -139,7 +143,12 @@ class MotionDatabase:
                 f"{len(motions)} motions were given, none so long"
             )
         return cls(
-            np.concatenate(poses), np.concatenate(flags), fps, tuple(clips), character.identity
+            np.concatenate(poses),
+            np.concatenate(flags),
+            fps,
+            tuple(clips),
+            character.identity,
+            credits,
         )
 
     def __len__(self) -> int:

@@ -83,6 +83,7 @@ class MotionGraph:
         config: GraphConfig | None = None,
         character: Character | None = None,
         contacts: Sequence[BoolArray] | None = None,
+        credits: tuple[str, ...] = (),
         threads: int = 0,
     ) -> MotionGraph:
         """Make a graph of motions.
@@ -92,6 +93,7 @@ class MotionGraph:
             config: Settings.
             character: Whose motions they are, by default the product's own.
             contacts: See `MotionDatabase.gather`.
+            credits: To whom the motions are owed, a line each.
             threads: Threads, 0 for all cores; the graph is the same bit for bit.
 
         Raises:
@@ -99,7 +101,9 @@ class MotionGraph:
         """
         config = config or GraphConfig()
         character = character or default_character()
-        database = MotionDatabase.gather(motions, character, config.fps, config.mirrored, contacts)
+        database = MotionDatabase.gather(
+            motions, character, config.fps, config.mirrored, contacts, credits
+        )
         return cls.of(database, config, threads)
 
     @classmethod

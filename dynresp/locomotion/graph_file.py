@@ -13,6 +13,7 @@ member            dtype    shape            what it holds
 ``clip_names``    text     (clips,)         names of the motions
 ``clip_hashes``   text     (clips,)         identities of the motions (`motion_identity`)
 ``clip_stops``    int64    (clips,)         one past each clip's last frame
+``credits``       text     (credits,)       to whom the motions are owed
 ``offsets``       int64    (frames + 1,)    where the rows of ways begin
 ``targets``       int32    (ways,)          where the ways lead
 ``distances``     float32  (ways,)          their distances
@@ -28,7 +29,7 @@ import dataclasses
 import hashlib
 import json
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -55,6 +56,7 @@ FORMAT = ArchiveFormat(
         "clip_names": (TEXT, ("clips",)),
         "clip_hashes": (TEXT, ("clips",)),
         "clip_stops": ("<i8", ("clips",)),
+        "credits": (TEXT, ("credits",)),
         "offsets": ("<i8", ("rows",)),
         "targets": ("<i4", ("ways",)),
         "distances": ("<f4", ("ways",)),
@@ -64,6 +66,7 @@ FORMAT = ArchiveFormat(
         "hands": 250_000,
         "rows": 250_001,
         "clips": 20_000,
+        "credits": 1_000,
         "ways": 50_000_000,
     },
     max_text=2_000,
@@ -135,6 +138,7 @@ def _arrays(graph: MotionGraph) -> Arrays:
         "clip_names": text_array([clip.name[:1000].rstrip("\0") for clip in database.clips]),
         "clip_hashes": text_array([clip.identity for clip in database.clips]),
         "clip_stops": np.array([clip.stop for clip in database.clips], dtype="<i8"),
+        "credits": text_array(list(database.credits)),
         "offsets": graph.offsets.astype("<i8"),
         "targets": graph.targets.astype("<i4"),
         "distances": graph.distances.astype("<f4"),
@@ -182,7 +186,12 @@ def _graph(arrays: Arrays) -> MotionGraph:
         raise ValueError("a pose is not finite")
     clips = [Clip(*clip) for clip in zip(names, starts, stops, hashes, strict=True)]
     database = MotionDatabase(
-        arrays["poses"], contacts, config.fps, tuple(clips), arrays["character"].item()
+        arrays["poses"],
+        contacts,
+        config.fps,
+        tuple(clips),
+        arrays["character"].item(),
+        tuple(arrays["credits"].tolist()),
     )
     offsets, targets, distances = (arrays[x] for x in ("offsets", "targets", "distances"))
     if len(offsets) != frames + 1 or offsets[0] != 0 or offsets[-1] != len(targets):
@@ -201,9 +210,9 @@ def _graph(arrays: Arrays) -> MotionGraph:
     first[starts] = True
     if first[targets[jumps]].any():
         raise ValueError("a jump leads to the first frame of a clip")
-    counts = [int(x) for x in arrays["counts"]]
-    similarity = None if counts[4] < 0 else counts[4]
-    told = PruningCounts(*counts[:4], similarity, *cast("tuple[int, int]", tuple(counts[5:])))
+    considered, pairs, contact, likelihood, similarity, *rest = (int(x) for x in arrays["counts"])
+    kept = None if similarity < 0 else similarity
+    told = PruningCounts(considered, pairs, contact, likelihood, kept, rest[0], rest[1])
     return MotionGraph(
         database, config, told, offsets.astype(np.int64), targets.astype(np.int32),
         distances.astype(np.float32),

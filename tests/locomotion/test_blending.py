@@ -88,7 +88,7 @@ def test_no_jump_leads_to_the_beginning_of_a_clip(graph: MotionGraph) -> None:
 
 
 def test_placements_say_where_the_recorded_pose_was_put(character: Character) -> None:
-    graph = walking_graph(character, sigma=0.3, blend_s=0.15)
+    graph = walking_graph(character, sigma=0.3, blend_s=0.15, blend_rate_s=0.15)
     walk = random_walk(graph, 400, np.random.default_rng(5))
     played = Playback(graph, int(walk[0])).play(walk[1:])
     jumps = np.flatnonzero(played.jumps)

@@ -6,18 +6,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.graph_config import GraphConfig
 from dynresp.motion.rotations import FloatArray
 
 
 def play(graph: MotionGraph, start: int, frames: list[int]) -> FloatArray:
     """Poses (k, 59) of frames played after a start that is played as recorded at the origin."""
-    database, blend_s = graph.database, graph.config.blend_s
+    database, config = graph.database, graph.config
     turn, shift = Rotation.identity(), np.zeros(3)
-    offset, rate, age = np.zeros(45), np.zeros(45), blend_s
+    offset, rate, age = np.zeros(45), np.zeros(45), config.blend_s
     played, before = [], start
     for frame in frames:
         if frame != database.successors[before]:
-            now, its_rate = decayed(offset, rate, age, blend_s)
+            now, its_rate = decayed(offset, rate, age, config)
             root, angles = placed(database.poses[before], turn, shift)
             pose_root = root + now[:3]
             pose_turns = angles * Rotation.from_rotvec(now[3:].reshape(14, 3))
@@ -35,7 +36,7 @@ def play(graph: MotionGraph, start: int, frames: list[int]) -> FloatArray:
             )
             rate, age = velocity - u, 0.0
         age += 1.0 / database.fps
-        now, _ = decayed(offset, rate, age, blend_s)
+        now, _ = decayed(offset, rate, age, config)
         root, angles = placed(database.poses[frame], turn, shift)
         shown = angles * Rotation.from_rotvec(now[3:].reshape(14, 3))
         played.append(np.concatenate([root + now[:3], shown.as_quat(scalar_first=True).ravel()]))
@@ -52,14 +53,21 @@ def placed(pose: FloatArray, turn: Any, shift: FloatArray) -> tuple[FloatArray, 
 
 
 def decayed(
-    offset: FloatArray, rate: FloatArray, age: float, blend_s: float
+    offset: FloatArray, rate: FloatArray, age: float, config: GraphConfig
 ) -> tuple[FloatArray, FloatArray]:
-    """The cubic that has a value and a slope at 0 and is at rest at `blend_s`, and its slope."""
-    if age >= blend_s:
+    """What is left of a displacement and its rate: a cubic each, at rest in the end."""
+    left, its_rate = cubic(offset, np.zeros(45), age, config.blend_s)
+    more, its_slope = cubic(np.zeros(45), rate, age, config.blend_rate_s)
+    return left + more, its_rate + its_slope
+
+
+def cubic(
+    value: FloatArray, slope: FloatArray, t: float, end: float
+) -> tuple[FloatArray, FloatArray]:
+    """Value and slope at t of the cubic that begins with a value and a slope, and ends at rest."""
+    if t >= end:
         return np.zeros(45), np.zeros(45)
-    t, b = age, blend_s
-    # a t^3 + b t^2 + rate t + offset, solved for its end.
-    system = np.array([[b**3, b**2], [3 * b**2, 2 * b]])
-    cubic, square = np.linalg.solve(system, np.stack([-offset - rate * b, -rate]))
-    value = ((cubic * t + square) * t + rate) * t + offset
-    return value, (3 * cubic * t + 2 * square) * t + rate
+    # a t^3 + b t^2 + slope t + value, solved for its end.
+    system = np.array([[end**3, end**2], [3 * end**2, 2 * end]])
+    a, b = np.linalg.solve(system, np.stack([-value - slope * end, -slope]))
+    return ((a * t + b) * t + slope) * t + value, (3 * a * t + 2 * b) * t + slope
