@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynresp.motion import rotations
 from dynresp.motion.character import default_character
 from dynresp.motion.rotations import FloatArray
 from dynresp.view import shapes
 from dynresp.view.shapes import Mesh
-from dynresp.view.story import PhaseName, Story, row_at
+from dynresp.view.story import Block, PhaseName, Story, row_at
 
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+# What reaches higher than this is a wall, of which only the lowest part is shown [m]: it would hide
+# the person beside it.
+_WALL, _WALL_SHOWN = 1.2, 0.35
 
 
 class Cast:
@@ -66,6 +70,26 @@ class Cast:
                 mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
                 meshes.append(mesh.placed(at, rod.quaternions[frame]))
         return meshes
+
+    def blocks(self) -> list[Mesh]:
+        """The blocks, in the world; walls are cut off above the knee."""
+        return [self._block(block) for block in self.story.blocks]
+
+    def underfoot(self, frame: int, within: float) -> list[Mesh]:
+        """Blocks, no walls, whose middle is this near to the main character at a frame [m]."""
+        return [
+            self._block(block)
+            for block in self.story.blocks
+            if block.top <= _WALL and self.distance(np.array(block.center), frame) <= within
+        ]
+
+    @staticmethod
+    def _block(block: Block) -> Mesh:
+        top = block.top if block.top <= _WALL else _WALL_SHOWN
+        bottom = min(block.center[2] - block.half_sizes[2], top - 0.01)
+        sizes = (*block.half_sizes[:2], 0.5 * (top - bottom))
+        center = np.array([*block.center[:2], 0.5 * (top + bottom)])
+        return shapes.box(sizes, shapes.BLOCK_COLOR).placed(center, rotations.from_yaw(block.yaw))
 
     def distance(self, point: FloatArray, frame: int) -> float:
         """From the main character's pelvis to a point (3,), along the ground [m]."""

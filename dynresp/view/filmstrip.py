@@ -35,6 +35,8 @@ _FLOOR_DEPTH = 0.26
 # Heights of what is not figures, and the margin at the sides [inch].
 _HEADING, _LABELS, _RULER = 0.62, 0.55, 0.30
 _MARGIN = 0.15
+# A block whose middle is this near to a figure [m] is drawn with it.
+_UNDERFOOT = 0.5
 
 
 @dataclass(frozen=True)
@@ -160,11 +162,16 @@ class _Strip:
         fade = np.linspace(faintest, 1.0, len(self.moments))
         shadows, figures = panel.canvas(), panel.canvas()
         self._floor(panel, shadows, float((self.prints + offsets)[:, 1].mean()))
+        standing = [] if np.isfinite(within) else self.cast.blocks()
+        if standing:
+            figures.lay(raster.draw(standing, self.view, panel.pixel), 0, 0, 1.0)
         for moment, offset, alpha in zip(self.moments, offsets, fade, strict=True):
             meshes = self.cast.meshes(moment.frame, moment.phase, 0.9, within)
             right, up = (round(float(x) / panel.pixel) for x in offset)
             shadow = raster.floor_shadow(meshes, self.yaw, self.elevation, panel.pixel)
             shadows.lay(shadow, right, up, 0.5 * float(alpha))
+            if not standing:
+                meshes = [*meshes, *self.cast.underfoot(moment.frame, _UNDERFOOT)]
             figures.lay(raster.draw(meshes, self.view, panel.pixel), right, up, float(alpha))
         panel.show(shadows, 1.0)
         panel.show(figures, 4.0)

@@ -37,6 +37,9 @@ _ALONE = (
     "content=\"default-src data: blob: 'unsafe-inline' 'unsafe-eval'\">"
 )
 
+# Lines on the ground are drawn this high above it [m], else the floor flickers through.
+_ABOVE_FLOOR = 0.004
+
 
 @dataclass(frozen=True)
 class RecordingConfig:
@@ -127,6 +130,16 @@ class _Scene:
         for i, rod in enumerate(story.capsules):
             mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
             self._things.append((rod, self._add_mesh(f"/limb/{i}_{rod.name}", mesh)))
+        for i, mesh in enumerate(self.cast.blocks()):
+            self._add_mesh(f"/block/{i}", mesh)
+        for i, path in enumerate(story.paths):
+            points = np.column_stack([path.points, np.full(len(path.points), _ABOVE_FLOOR)])
+            self.scene.add_line_segments(
+                f"/path/{i}_{path.name}",
+                np.stack([points[:-1], points[1:]], axis=1).astype(np.float32),
+                colors=_bytes(shapes.PATH_COLOR),
+                line_width=3.0,
+            )
         self._label = self.scene.add_label(
             "/phase", " ", anchor="bottom-center", font_size_mode="screen", font_screen_scale=1.1
         )

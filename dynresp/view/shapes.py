@@ -35,6 +35,8 @@ PHASE_COLORS: dict[PhaseName, Color] = {
 
 BALL_COLOR: Color = (0.85, 0.33, 0.10)
 CAPSULE_COLOR: Color = (0.35, 0.30, 0.38)
+BLOCK_COLOR: Color = (0.72, 0.62, 0.48)
+PATH_COLOR: Color = (0.16, 0.42, 0.70)
 # Shirts of the further characters.
 _OTHER_SHIRTS: tuple[Color, ...] = ((0.55, 0.30, 0.48), (0.42, 0.50, 0.25), (0.62, 0.45, 0.22))
 
@@ -191,6 +193,26 @@ def capsule(radius: float, half_length: float, color: Color) -> Mesh:
     """A capsule about the origin, along Z; half_length is that of its straight part [m]."""
     end = np.array([0.0, 0.0, half_length])
     return hull([(end, radius), (-end, radius)], color)
+
+
+def box(half_sizes: Sequence[float], color: Color) -> Mesh:
+    """A box about the origin; half_sizes are half its sides [m]."""
+    size = np.asarray(half_sizes, dtype=np.float64)
+    vertices, normals, faces = [], [], []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            normal = np.zeros(3)
+            normal[axis] = sign
+            across, up = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
+            corners = [
+                normal + a * across + b * up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+            ]
+            order = [0, 1, 2, 3] if sign > 0 else [3, 2, 1, 0]
+            first = len(vertices)
+            vertices += [corners[i] * size for i in order]
+            normals += [normal] * 4
+            faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
+    return Mesh(np.array(vertices), np.array(normals), np.array(faces), color)
 
 
 def hull(balls: Sequence[tuple[FloatArray, float]], color: Color, detail: int = 2) -> Mesh:

@@ -89,6 +89,59 @@ class MovingCapsule:
 
 
 @dataclass(frozen=True)
+class Block:
+    """A box that stands still: a wall, a stool, a block of rough ground.
+
+    Attributes:
+        center: Its middle [m], world.
+        half_sizes: Half its length along its own x, y and z [m].
+        yaw: By how much it is turned about the vertical [rad].
+
+    Raises:
+        MotionError: A number is not finite, or a size is not positive.
+    """
+
+    center: tuple[float, float, float]
+    half_sizes: tuple[float, float, float]
+    yaw: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not all(math.isfinite(x) for x in (*self.center, self.yaw)):
+            raise MotionError(f"a block must be at a finite place, got {self.center}")
+        for size in self.half_sizes:
+            _check_length("half a side", "block", size)
+
+    @property
+    def top(self) -> float:
+        """How high it reaches [m]."""
+        return self.center[2] + self.half_sizes[2]
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPath:
+    """A line drawn on the ground, such as a sketched way. The array is read-only.
+
+    Attributes:
+        name: What it is, for people, such as "sketch".
+        points: (n, 2) [m].
+
+    Raises:
+        MotionError: A wrong shape, or a number that is not finite.
+    """
+
+    name: str
+    points: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check and freeze the points."""
+        points = _rows(self.name, "points", self.points, 2)
+        if np.isnan(points).any() or len(points) < 2:
+            raise MotionError(f"{self.name}: a path needs two or more finite points")
+        object.__setattr__(self, "points", points)
+
+
+@dataclass(frozen=True)
 class Event:
     """Something that happens at one moment.
 
@@ -139,6 +192,8 @@ class Story:
         spheres: Balls.
         capsules: Limbs or sticks.
         others: Further characters, at the frame rate of `motion`; each holds its last pose.
+        blocks: What stands about.
+        paths: What is drawn on the ground.
         events: Moments with names.
         phases: What drives the main character when; where they overlap, the later one counts.
         title: First line, for people.
@@ -152,6 +207,8 @@ class Story:
     spheres: Sequence[MovingSphere] = ()
     capsules: Sequence[MovingCapsule] = ()
     others: Sequence[Motion] = ()
+    blocks: Sequence[Block] = ()
+    paths: Sequence[GroundPath] = ()
     events: Sequence[Event] = ()
     phases: Sequence[Phase] = ()
     title: str = ""
@@ -161,7 +218,7 @@ class Story:
 
     def __post_init__(self) -> None:
         """Check that all parts share one clock."""
-        for name in ("spheres", "capsules", "others", "events", "phases"):
+        for name in ("spheres", "capsules", "others", "blocks", "paths", "events", "phases"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         for other in self.others:
             if other.fps != self.motion.fps:

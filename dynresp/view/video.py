@@ -253,6 +253,8 @@ def _script(
     for rod in story.capsules:
         mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
         actors.add(mesh, rod.positions, rod.quaternions)
+    for mesh in cast.blocks():
+        actors.add(mesh, np.zeros((len(story.motion), 3)))
     return {
         **actors.arrays(),
         **_camera(story, frames, config, fps),
