@@ -85,8 +85,8 @@ def take_motion(
             "Name a folder that holds it with --motions or DYNRESP_MOTIONS, fetch it with "
             f'`dynresp motions fetch core`, or write or = "{BUILTIN_PREFIX}walk" beside it.'
         )
-    motion = _load(cut, found, character)
-    return Taken(_cut(motion, cut, key, fps, character), _about(cut, found), cut)
+    motion = load_cut(cut, found, key, character).resampled(fps)
+    return Taken(motion, about_cut(cut, found), cut)
 
 
 def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str | None:
@@ -117,6 +117,36 @@ def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str 
     return find_motion_file(given.as_posix(), folders)
 
 
+def load_cut(cut: MotionCut, found: Path | str, key: str, character: Character) -> Motion:
+    """Load a motion, and cut and mirror it as its table says.
+
+    Args:
+        cut: The table.
+        found: What `find_motion` found.
+        key: Where the table stands in the file, for messages.
+        character: The character.
+
+    Returns:
+        The motion at its own frame rate.
+
+    Raises:
+        SpecError: The cut does not fit the motion.
+        DynrespError: The file cannot be read.
+    """
+    motion = _load(cut, found, character)
+    stop_s = motion.duration if cut.stop_s is None else cut.stop_s
+    if cut.start_s >= motion.duration or stop_s > motion.duration + 0.5 / motion.fps:
+        asked = "start_s" if cut.start_s >= motion.duration else "stop_s"
+        raise SpecError(
+            f"{key}.{asked}: expected at most {motion.duration:.2f} s, which is how long "
+            f"{cut.motion!r} lasts{' without its T-poses' if cut.trim_t_pose else ''}, "
+            f"got {getattr(cut, asked):g}"
+        )
+    first, last = round(cut.start_s * motion.fps), round(stop_s * motion.fps)
+    part = motion.slice(first, min(last + 1, len(motion)))
+    return part.mirrored(character) if cut.mirrored else part
+
+
 def _load(cut: MotionCut, found: Path | str, character: Character) -> Motion:
     if isinstance(found, str):
         return load_builtin(found, character)
@@ -131,25 +161,13 @@ def _load(cut: MotionCut, found: Path | str, character: Character) -> Motion:
     return load_motion(found, character, options)
 
 
-def _cut(motion: Motion, cut: MotionCut, key: str, fps: float, character: Character) -> Motion:
-    """Cut, mirror and resample."""
-    stop_s = motion.duration if cut.stop_s is None else cut.stop_s
-    if cut.start_s >= motion.duration or stop_s > motion.duration + 0.5 / motion.fps:
-        asked = "start_s" if cut.start_s >= motion.duration else "stop_s"
-        raise SpecError(
-            f"{key}.{asked}: expected at most {motion.duration:.2f} s, which is how long "
-            f"{cut.motion!r} lasts{' without its T-poses' if cut.trim_t_pose else ''}, "
-            f"got {getattr(cut, asked):g}"
-        )
-    first, last = round(cut.start_s * motion.fps), round(stop_s * motion.fps)
-    part = motion.slice(first, min(last + 1, len(motion)))
-    if cut.mirrored:
-        part = part.mirrored(character)
-    return part.resampled(fps)
+def about_cut(cut: MotionCut, found: Path | str) -> dict[str, Any]:
+    """Where a motion comes from, for `result.json`, without saying where on this machine.
 
-
-def _about(cut: MotionCut, found: Path | str) -> dict[str, Any]:
-    """Where a motion comes from, without saying where on this machine."""
+    Args:
+        cut: The table that names it.
+        found: What `find_motion` found.
+    """
     told = cut.model_dump(exclude_defaults=True, by_alias=True, exclude={"otherwise", "hit_s"})
     if isinstance(found, str):
         return {**told, "built_in": True}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -10,22 +9,19 @@ from dynresp.experiments.folder import (
     RESULT,
     WRITTEN,
     NothingToShowError,
-    attempt,
     clear_response,
 )
 from dynresp.experiments.hits import Hit
 from dynresp.experiments.result import describe, outcome, write_json
 from dynresp.experiments.showing import show
 from dynresp.experiments.spec import Artefact, OutputTable
+from dynresp.experiments.story_files import Progress, story_writers, write_files
 from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
 from dynresp.physics.impacts import Strike
 from dynresp.response.quality import Quality
 from dynresp.response.response import Response, ResponseConfig
 from dynresp.response.surface import landscape
-
-Progress = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many."""
 
 
 def write_response(
@@ -67,47 +63,12 @@ def write_response(
     """
     shown = show(response, hit.impact, output.lead_in_s, title, _subtitle(hit, response))
     story = shown.story
-    files: dict[str, str] = {}
-
-    def video(path: Path) -> None:
-        from dynresp.view.video import write_video
-
-        write_video(
-            story,
-            path,
-            output.video_size_px,
-            output.video_fps,
-            progress=lambda done, of: progress("drawing the video", done, of),
-        )
-
-    def motion(path: Path) -> None:
-        from dynresp.motion import export
-
-        write = export.write_npz if path.suffix == ".npz" else export.write_bvh
-        write(story.motion, path, character)
-
-    def recording(path: Path) -> None:
-        from dynresp.view.recording import write_recording
-
-        write_recording(story, path)
-
-    def filmstrip(path: Path) -> None:
-        from dynresp.view.filmstrip import write_filmstrip
-
-        write_filmstrip(story, path)
-
-    writers: dict[str, Callable[[Path], None]] = {
-        "motion.npz": motion,
-        "motion.bvh": motion,
-        "recording.html": recording,
-        "filmstrip.png": filmstrip,
+    writers = {
+        **story_writers(story, character, output.video_size_px, output.video_fps, progress),
         "alignment.png": lambda path: _write_alignment(path, response, title, character, config),
-        "video.mp4": video,
     }
-    names: Sequence[str] = [name for name in get_args(Artefact) if name in output.write]
-    for done, name in enumerate(names):
-        progress(f"writing {name}", done, len(names))
-        files[name] = attempt(writers[name], folder / name)
+    names = [name for name in get_args(Artefact) if name in output.write]
+    files = write_files(folder, names, writers, progress)
     there = [name for name, what in files.items() if what == WRITTEN]
     left = clear_response(folder, [RESULT, *there])
     files |= {name: what for name, what in left.items() if name not in files}

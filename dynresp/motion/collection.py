@@ -5,6 +5,7 @@ They are read from the files that need them, so that a collection cannot go stal
 
 from __future__ import annotations
 
+import fnmatch
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -15,12 +16,16 @@ from dynresp.motion.catalogue import SourceFile, load_sources
 from dynresp.motion.sources import MOTION_SUFFIXES, checked_relative_path
 from dynresp.paths import examples_folder, reactions_folder
 
+GRAPHS = "graphs"
+"""Name of the folder of graph plans among the examples, and of the collection that they need."""
+
 COLLECTIONS: Mapping[str, str] = {
     "core": "what reactions/core.toml, the example experiments and the plans use",
     "full": "core, and what reactions/full.toml uses",
+    GRAPHS: "what the motion graphs of `dynresp graph build` use",
     "all": "every file in reactions/sources.csv",
 }
-"""Names of the collections, the smallest first, and what each holds."""
+"""Names of the collections and what each holds."""
 
 
 def collection_files(
@@ -32,8 +37,8 @@ def collection_files(
 ) -> list[SourceFile]:
     """List what a collection holds: clips, the skeletons they need, and the licence texts.
 
-    "core" and "full" hold every motion file that the library files name, as `files_named_in`
-    finds them.
+    All but "all" hold every motion file that library files, examples and plans name, as
+    `files_named_in` finds them; a name with wildcards stands for all that it matches.
 
     Args:
         name: A name in `COLLECTIONS`.
@@ -56,18 +61,25 @@ def collection_files(
         return [sources[file] for file in sorted(sources)]
     reactions = reactions or reactions_folder()
     shown = sorted((examples or examples_folder()).rglob("*.toml"))
-    libraries = [reactions / "core.toml", *shown]
+    if name == GRAPHS:
+        libraries = [file for file in shown if file.parent.name == GRAPHS]
+    else:
+        shown = [file for file in shown if file.parent.name != GRAPHS]
+        libraries = [reactions / "core.toml", *shown]
     if name == "full":
         libraries.append(reactions / "full.toml")
     wanted: set[str] = set()
     for library in libraries:
-        for file in files_named_in(library):
-            if file not in sources:
+        for given in files_named_in(library):
+            clips = [file for file, source in sources.items() if source.kind == "clip"]
+            files = fnmatch.filter(clips, given) if "*" in given else [given]
+            file = next((file for file in files or [given] if file not in sources), None)
+            if file is not None:
                 raise SpecError(
                     f"{library} names the motion file {file!r}, which is not in the source "
                     "table; correct the name or add a row to reactions/sources.csv."
                 )
-            wanted.add(file)
+            wanted.update(files)
     return _with_companions(wanted, sources)
 
 
