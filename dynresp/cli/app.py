@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from dynresp import __version__
-from dynresp.cli import bench, demo, evaluate, generate, motions, reactions, run, train
+from dynresp.cli import bench, demo, evaluate, generate, graph, motions, reactions, run, train
 from dynresp.cli.interruption import INTERRUPTED
 from dynresp.errors import DynrespError
 
@@ -69,6 +69,7 @@ app.command("demo")(demo.demo)
 app.command("generate")(generate.generate)
 app.command("train")(train.train)
 app.command("evaluate")(evaluate.evaluate)
+app.add_typer(graph.app, name="graph")
 app.add_typer(motions.app, name="motions")
 app.add_typer(reactions.app, name="reactions")
 app.add_typer(bench.app, name="bench")

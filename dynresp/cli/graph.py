@@ -1,0 +1,18 @@
+"""`dynresp graph`: motion graphs, and avatars that go through them."""
+
+from __future__ import annotations
+
+import typer
+
+from dynresp.cli.graph_build import build
+from dynresp.cli.graph_info import info
+from dynresp.cli.graph_walk import walk
+
+app = typer.Typer(
+    help="Motion graphs: avatars that walk on for ever through recorded motion.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+app.command()(build)
+app.command()(info)
+app.command()(walk)

@@ -1,0 +1,57 @@
+"""`dynresp graph build`: from motions to a graph."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dynresp.cli.options import Json, Motions
+from dynresp.cli.progress import progress
+
+# The plan that is taken where none is named, and the one for want of its motions.
+_USUAL, _INSTEAD = "walking", "builtin"
+
+
+def build(
+    out: Annotated[Path, typer.Option("--out", metavar="GRAPH.npz", help="The graph's file.")],
+    plan: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[PLAN]",
+            help="A plan that comes with dynresp (walking, builtin, ...) or a file (.toml); by "
+            "default walking, or builtin where its motions are not on this machine.",
+        ),
+    ] = None,
+    motions: Motions = None,
+    as_json: Json = False,
+) -> None:
+    """Build a motion graph, and say how many jumps each pruning rule has left."""
+    from dynresp.cli.graph_info import tell_graph
+    from dynresp.errors import MissingMotionDataError
+    from dynresp.graphs.building import build_graph
+    from dynresp.graphs.plan import find_plan, read_plan
+    from dynresp.locomotion.graph_file import save_graph
+    from dynresp.motion.character import default_character
+    from dynresp.motion.sources import motion_folders
+
+    folders = motion_folders(motions)
+    character = default_character()
+    with progress() as tell:
+        path = find_plan(plan or _USUAL)
+        try:
+            graph = build_graph(read_plan(path), folders, path.parent, character, tell)
+        except MissingMotionDataError:
+            if plan is not None:
+                raise
+            typer.echo(
+                f"dynresp: the motions of {_USUAL!r} are not on this machine; building the graph "
+                "of built-in motion. Fetch them with `dynresp motions fetch graphs`.",
+                err=True,
+            )
+            path = find_plan(_INSTEAD)
+            graph = build_graph(read_plan(path), folders, path.parent, character, tell)
+        tell(f"writing {out}", 0, 1)
+        save_graph(graph, out)
+    typer.echo(tell_graph(graph, out, as_json))

@@ -1,0 +1,102 @@
+"""`dynresp graph walk`: an avatar that walks on by chance, or by choice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dynresp.cli.graph_info import Graph
+from dynresp.cli.options import Json, Seed
+from dynresp.cli.progress import progress
+from dynresp.cli.run import check_folder
+
+if TYPE_CHECKING:
+    from dynresp.graphs.outing import Outing
+    from dynresp.locomotion.graph import MotionGraph
+
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+Fps = Annotated[
+    float, typer.Option("--fps", min=1.0, max=240.0, help="Frame rate of the motion written.")
+]
+Video = Annotated[bool, typer.Option("--video/--no-video", help="Whether to draw a video.")]
+USUAL_FPS = 30.0
+
+
+def walk(
+    graph: Graph,
+    out: Out,
+    seconds: Annotated[
+        float, typer.Option("--seconds", min=1.0, max=3600.0, help="How long it walks.")
+    ] = 20.0,
+    seed: Seed = None,
+    fps: Fps = USUAL_FPS,
+    video: Video = True,
+    as_json: Json = False,
+) -> None:
+    """Walk by the graph's probabilities.
+
+    Writes result.json, motion.npz, motion.bvh, recording.html, filmstrip.png, plan.png and, where
+    the machine can render, video.mp4.
+    """
+    import numpy as np
+
+    from dynresp.graphs.outing import Outing
+    from dynresp.locomotion.composing import compose
+    from dynresp.locomotion.graph_file import load_graph
+    from dynresp.locomotion.walk import random_walk
+    from dynresp.motion.character import default_character
+
+    loaded = load_graph(graph)
+    check_folder(out)
+    frames = max(2, round(seconds * loaded.config.fps) + 1)
+    path = random_walk(loaded, frames, np.random.default_rng(seed or 0))
+    composition = compose(loaded, default_character(), path, fps=fps)
+    outing = Outing(
+        title=f"A walk by chance through {graph.name}",
+        subtitle=f"{composition.motion.duration:.0f} s, {len(composition.jumps)} jumps, "
+        f"seed {seed or 0}",
+        composition=composition,
+        about={"seed": seed or 0},
+    )
+    finish(out, loaded, outing, video, as_json)
+
+
+def finish(out: Path, graph: MotionGraph, outing: Outing, video: bool, as_json: bool) -> None:
+    """Write an outing and say what came of it.
+
+    Raises:
+        typer.Exit: With code 1, where a file could not be written.
+    """
+    from dynresp.experiments.folder import WRITTEN, is_failure
+    from dynresp.experiments.result import to_json
+    from dynresp.graphs.outing import write_outing
+    from dynresp.motion.character import default_character
+
+    with progress() as tell:
+        content = write_outing(out, graph, outing, default_character(), tell, video)
+    for name, what in content["files"].items():
+        if what != WRITTEN:
+            typer.echo(f"dynresp: {name} {what}", err=True)
+    typer.echo(to_json(content) if as_json else tell_outing(content, out))
+    if any(is_failure(what) for what in content["files"].values()):
+        raise typer.Exit(1)
+
+
+def tell_outing(content: dict[str, Any], out: Path) -> str:
+    """What came of an outing, for people."""
+    happened = content["happened"]
+    skate = happened["foot_skate_fitted_m"]
+    lines = [
+        content["title"],
+        f"  {happened['way_m']:.1f} m in {happened['seconds']:.1f} s, {happened['jumps']} jumps",
+        f"  feet slide {1000 * skate['median']:.0f} mm a stance (median of {skate['stances']}), "
+        f"{1000 * skate['percentile_95']:.0f} mm at the 95th percentile; as blended "
+        f"{1000 * happened['foot_skate_as_blended_m']['median']:.0f} mm",
+    ]
+    if content["graph"]["built_in_clips"]:
+        lines.append("  made of built-in motion, no motion capture")
+    lines += [f"  {line}" for line in content["graph"]["credits"]]
+    lines.append(f"  written to {out}")
+    return "\n".join(lines)

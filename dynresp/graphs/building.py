@@ -1,0 +1,88 @@
+"""From a plan to a graph: finding, loading and cutting its motions, and their contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from dynresp.errors import MissingMotionDataError
+from dynresp.experiments.motions import about_cut, find_motion, load_cut
+from dynresp.experiments.spec import MotionCut
+from dynresp.graphs.plan import GraphPlan
+from dynresp.locomotion.graph import MotionGraph
+from dynresp.motion.character import Character
+from dynresp.motion.motion import Motion
+from dynresp.motion.sources import list_motion_files
+
+Progress = Callable[[str, int, int], None]
+"""Told the stage, how many are done, and of how many."""
+
+_NAMED_MISSING = 5
+
+
+def build_graph(
+    plan: GraphPlan,
+    folders: Sequence[Path],
+    beside: Path,
+    character: Character,
+    progress: Progress,
+    threads: int = 0,
+) -> MotionGraph:
+    """Build the graph of a plan.
+
+    Args:
+        plan: What it is made of.
+        folders: Motions folders.
+        beside: Folder of the plan's file, from which relative paths count first.
+        character: The character.
+        progress: Told the stage, how many are done, and of how many.
+        threads: Threads, 0 for all cores.
+
+    Raises:
+        MissingMotionDataError: Motion files are not on this machine.
+        DynrespError: A file cannot be read, or there is no graph of what it holds.
+    """
+    spelled = [cut for given in plan.motion for cut in _spelled_out(given, folders, beside)]
+    cuts = [cut for cut in spelled if cut.motion not in plan.leave_out]
+    found = [find_motion(cut.motion, folders, beside) for cut in cuts]
+    _refuse_missing([c.motion for c, f in zip(cuts, found, strict=True) if f is None], folders)
+    motions: list[Motion] = []
+    owed: dict[str, None] = {}
+    for number, (cut, where) in enumerate(zip(cuts, found, strict=True)):
+        assert where is not None
+        progress("loading motions", number, len(cuts))
+        motions.append(load_cut(cut, where, f"motion {number + 1}", character))
+        about = about_cut(cut, where)
+        if "credit" in about:
+            owed[about["credit"]] = None
+    progress("comparing frames", 0, 1)
+    return MotionGraph.build(
+        motions, plan.graph.config(), character, credits=tuple(owed), threads=threads
+    )
+
+
+def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:
+    """A table for each file that a name with wildcards stands for; else the table itself."""
+    if not any(sign in given.motion for sign in "*?["):
+        return [given]
+    for folder in (beside, *folders):
+        files = [file.relative_to(folder).as_posix() for file in list_motion_files(folder)]
+        matching = [name for name in files if fnmatchcase(name, given.motion)]
+        if matching:
+            return [given.model_copy(update={"motion": name}) for name in matching]
+    _refuse_missing([given.motion], folders)
+    return []
+
+
+def _refuse_missing(names: list[str], folders: Sequence[Path]) -> None:
+    if not names:
+        return
+    looked = ", ".join(str(folder) for folder in folders) or "no folder: none is known"
+    more = len(names) - _NAMED_MISSING
+    told = ", ".join(names[:_NAMED_MISSING]) + (f" and {more} more" if more > 0 else "")
+    raise MissingMotionDataError(
+        f"the graph needs motion files that are not on this machine: {told} (looked in {looked}); "
+        "name a folder that holds them with --motions or DYNRESP_MOTIONS, or build the graph of "
+        "built-in motion with `dynresp graph build builtin`."
+    )

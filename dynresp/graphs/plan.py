@@ -1,0 +1,148 @@
+"""What a graph plan says: which motions, and how a graph is made of them (`docs/locomotion.md`)."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from dynresp.errors import SpecError, UnknownNameError, UsageError
+from dynresp.experiments.mistakes import (
+    explain_value,
+    keys_of,
+    read_toml,
+    unknown_key,
+    validate,
+)
+from dynresp.experiments.spec import MotionCut, Strict
+from dynresp.experiments.values import fixed
+from dynresp.locomotion.graph_config import Coordinates, GraphConfig
+from dynresp.motion.collection import GRAPHS
+from dynresp.paths import examples_folder
+
+WorldName = Literal["flat", "terrain", "stool", "playground"]
+"""Where the motions were recorded; it says what counts as a contact."""
+
+
+class GraphTable(Strict):
+    """`[graph]`: its name, its world, and settings; what is left out is as in `GraphConfig`."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    world: WorldName = "flat"
+    fps: Annotated[float | None, fixed(1.0, 240.0, "frames a second")] = None
+    mirrored: bool = False
+    coordinates: Literal["relative", "fixed", "blocks"] | None = None
+    contact_change: bool | None = None
+    local_maxima: bool | None = None
+    sigma: Annotated[float | None, fixed(1e-6, 1e3)] = None
+    least_probability: Annotated[float | None, fixed(1e-9, 0.999)] = None
+    velocity_weight: Annotated[float | None, fixed(0.0, 100.0)] = None
+    stutter_s: Annotated[float | None, fixed(0.0, 10.0, "s")] = None
+    blend_s: Annotated[float | None, fixed(0.01, 10.0, "s")] = None
+    blend_rate_s: Annotated[float | None, fixed(0.01, 10.0, "s")] = None
+
+    def config(self) -> GraphConfig:
+        """The settings.
+
+        Raises:
+            UsageError: They contradict each other.
+        """
+        said = self.model_dump(exclude={"name", "world"}, exclude_none=True)
+        if self.coordinates is not None:
+            said["coordinates"] = Coordinates(self.coordinates)
+        if self.blend_s is not None and self.blend_rate_s is None:
+            said["blend_rate_s"] = min(self.blend_s, GraphConfig.blend_rate_s)
+        return GraphConfig(**said)
+
+
+class GraphPlan(Strict):
+    """A whole plan.
+
+    Motions under `leave_out` are not taken although a name with wildcards stands for them.
+    """
+
+    graph: GraphTable
+    motion: Annotated[list[MotionCut], Field(min_length=1, max_length=1000)]
+    leave_out: Annotated[list[str], Field(max_length=1000)] = []
+
+
+_TABLES: dict[tuple[str, ...], type[BaseModel]] = {
+    (): GraphPlan,
+    ("graph",): GraphTable,
+    ("motion",): MotionCut,
+}
+_HINTS = {
+    "graph": "add [graph] with name",
+    "name": "say in a few words what the graph is of",
+    "motion": 'add [[motion]] with motion = "builtin:walk", a path inside a motions folder, or one '
+    "with * for several files",
+}
+
+
+def plans_folder() -> Path:
+    """Folder of the plans that come with dynresp."""
+    return examples_folder() / GRAPHS
+
+
+def plan_names() -> tuple[str, ...]:
+    """Names of the plans that come with dynresp, sorted."""
+    return tuple(sorted(file.stem for file in plans_folder().glob("*.toml")))
+
+
+def find_plan(given: str) -> Path:
+    """The file of a plan.
+
+    Args:
+        given: The name of one that comes with dynresp, or a file (.toml).
+
+    Raises:
+        UnknownNameError: There is none of that name.
+    """
+    if given.endswith(".toml"):
+        return Path(given)
+    if given not in plan_names():
+        raise UnknownNameError("graph plan", given, [*plan_names(), "a plan file (.toml)"])
+    return plans_folder() / f"{given}.toml"
+
+
+def read_plan(path: Path | str) -> GraphPlan:
+    """Read a graph plan.
+
+    Args:
+        path: A TOML file.
+
+    Returns:
+        What it says, checked.
+
+    Raises:
+        SpecError: It cannot be read, is too large or not TOML, or says something that is not
+            allowed. The message names the file, the key, what was given and what is allowed.
+    """
+    content = read_toml(Path(path), "a graph plan")
+    plan = validate(GraphPlan, content, str(path), partial(_explain, content=content))
+    try:
+        plan.graph.config()
+    except UsageError as error:
+        raise SpecError(f"{path}: [graph]: {error}") from None
+    return plan
+
+
+def _explain(error: dict[str, Any], content: dict[str, Any]) -> str:
+    """One mistake in words: where, what was given, what is allowed."""
+    words: list[str] = []
+    for part in error["loc"]:
+        if isinstance(part, str):
+            words.append(part)
+        elif isinstance(content.get(words[-1]), list) and len(content[words[-1]]) > 1:
+            words[-1] += f" {part + 1}"
+    where = ".".join(words)
+    keys = [part for part in error["loc"] if isinstance(part, str)]
+    if error["type"] == "extra_forbidden":
+        table = tuple(keys[:-1])
+        what = f"[{'.'.join(table)}]" if table else "the file"
+        return unknown_key(where, what, keys_of(_TABLES[table]))
+    if error["type"] == "missing":
+        return f"{where} is missing; {_HINTS.get(keys[-1], 'it is needed here')}"
+    return explain_value(error, where, ())
