@@ -90,5 +90,14 @@ def generate(motions: Motions = None, seed: Seed = None, as_json: Json = False) 
     _print(bench.run(seed or 0, motions), as_json)
 
 
+@app.command()
+def graph(motions: Motions = None, seed: Seed = None, as_json: Json = False) -> None:
+    """Time to build a motion graph, and to walk it, against vectorised NumPy."""
+    typer.echo("building and walking for about twenty seconds ...", err=True)
+    from dynresp.bench import graph as bench
+
+    _print(bench.run(seed or 0, motions), as_json)
+
+
 def _print(result: BenchResult, as_json: bool) -> None:
     typer.echo(json.dumps(result.to_json(), indent=2) if as_json else result.to_text())

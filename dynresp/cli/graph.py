@@ -6,6 +6,7 @@ import typer
 
 from dynresp.cli.graph_build import build
 from dynresp.cli.graph_info import info
+from dynresp.cli.graph_sketch import sketch
 from dynresp.cli.graph_walk import walk
 
 app = typer.Typer(
@@ -16,3 +17,4 @@ app = typer.Typer(
 app.command()(build)
 app.command()(info)
 app.command()(walk)
+app.command()(sketch)

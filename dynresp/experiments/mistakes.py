@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -110,6 +110,37 @@ def explain_value(error: dict[str, Any], where: str, kinds: Iterable[str]) -> st
         return f"{where}: expected {context['expected']}, got {shown(given)}"
     message = _TYPES.get(kind, str(error["msg"]).removeprefix("Input should be "))
     return f"{where}: expected {message}, got {shown(given)}"
+
+
+def explain_in_tables(
+    error: dict[str, Any],
+    content: dict[str, Any],
+    tables: Mapping[tuple[str, ...], type[BaseModel]],
+    hints: Mapping[str, str],
+) -> str:
+    """One mistake of a file whose tables lie side by side, in words.
+
+    Args:
+        error: One of pydantic's.
+        content: What the file says.
+        tables: What each table may hold; () is the file itself.
+        hints: By key, what to do where it is missing.
+    """
+    words: list[str] = []
+    for part in error["loc"]:
+        if isinstance(part, str):
+            words.append(part)
+        elif isinstance(content.get(words[-1]), list) and len(content[words[-1]]) > 1:
+            words[-1] += f" {part + 1}"
+    where = ".".join(words)
+    keys = [part for part in error["loc"] if isinstance(part, str)]
+    if error["type"] == "extra_forbidden":
+        table = tuple(keys[:-1])
+        what = f"[{'.'.join(table)}]" if table else "the file"
+        return unknown_key(where, what, keys_of(tables[table]))
+    if error["type"] == "missing":
+        return f"{where} is missing; {hints.get(keys[-1], 'it is needed here')}"
+    return explain_value(error, where, ())
 
 
 def unknown_key(where: str, what: str, allowed: Iterable[str]) -> str:

@@ -9,13 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from dynresp.errors import SpecError, UnknownNameError, UsageError
-from dynresp.experiments.mistakes import (
-    explain_value,
-    keys_of,
-    read_toml,
-    unknown_key,
-    validate,
-)
+from dynresp.experiments.mistakes import explain_in_tables, read_toml, validate
 from dynresp.experiments.spec import MotionCut, Strict
 from dynresp.experiments.values import fixed
 from dynresp.locomotion.graph_config import Coordinates, GraphConfig
@@ -65,7 +59,7 @@ class GraphPlan(Strict):
 
     graph: GraphTable
     motion: Annotated[list[MotionCut], Field(min_length=1, max_length=1000)]
-    leave_out: Annotated[list[str], Field(max_length=1000)] = []
+    leave_out: Annotated[list[str], Field(default_factory=list, max_length=1000)]
 
 
 _TABLES: dict[tuple[str, ...], type[BaseModel]] = {
@@ -131,18 +125,4 @@ def read_plan(path: Path | str) -> GraphPlan:
 
 def _explain(error: dict[str, Any], content: dict[str, Any]) -> str:
     """One mistake in words: where, what was given, what is allowed."""
-    words: list[str] = []
-    for part in error["loc"]:
-        if isinstance(part, str):
-            words.append(part)
-        elif isinstance(content.get(words[-1]), list) and len(content[words[-1]]) > 1:
-            words[-1] += f" {part + 1}"
-    where = ".".join(words)
-    keys = [part for part in error["loc"] if isinstance(part, str)]
-    if error["type"] == "extra_forbidden":
-        table = tuple(keys[:-1])
-        what = f"[{'.'.join(table)}]" if table else "the file"
-        return unknown_key(where, what, keys_of(_TABLES[table]))
-    if error["type"] == "missing":
-        return f"{where} is missing; {_HINTS.get(keys[-1], 'it is needed here')}"
-    return explain_value(error, where, ())
+    return explain_in_tables(error, content, _TABLES, _HINTS)

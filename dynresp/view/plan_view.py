@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from dynresp.view.story import Block, Story
 
 _INK = (0.14, 0.15, 0.18)
 _FAINT_INK = (0.48, 0.51, 0.55)
+_OTHER_PATH = (0.25, 0.62, 0.45)
 _TRACK = (0.80, 0.30, 0.14)
 _DPI = 150
 # Longer side of the picture, and least shorter one [inch].
@@ -67,8 +69,8 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
         patches.set_edgecolor((1.0, 1.0, 1.0, 0.5))
         patches.set_linewidth(0.4)
         axes.add_collection(patches)
-    for line in story.paths:
-        axes.plot(*line.points.T, color=PATH_COLOR, lw=3.5, alpha=0.45, label=line.name,
+    for line, color in zip(story.paths, itertools.cycle((PATH_COLOR, _OTHER_PATH)), strict=False):
+        axes.plot(*line.points.T, color=color, lw=3.5, alpha=0.45, label=line.name,
                   solid_capstyle="round")  # fmt: skip
     axes.plot(*track.T, color=_TRACK, lw=1.3, label="pelvis")
     step = max(1, round(_ARROW_S * story.motion.fps))

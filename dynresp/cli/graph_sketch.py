@@ -1,0 +1,134 @@
+"""`dynresp graph sketch`: an avatar that walks along a drawn path, or to a place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dynresp.cli.graph_info import Graph
+from dynresp.cli.graph_walk import USUAL_FPS, Fps, Out, Video, finish
+from dynresp.cli.options import Json, Seed
+from dynresp.cli.progress import progress
+from dynresp.cli.run import check_folder
+
+if TYPE_CHECKING:
+    from dynresp.motion.rotations import FloatArray
+
+
+def sketch(
+    graph: Graph,
+    out: Out,
+    points: Annotated[
+        str | None,
+        typer.Option(
+            "--points", metavar="'X,Y X,Y ...'", help="Corners of the path on the ground [m]."
+        ),
+    ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option("--path", metavar="FILE.csv", help="The same, a corner a line: x, y."),
+    ] = None,
+    goal: Annotated[
+        str | None,
+        typer.Option("--goal", metavar="X,Y", help="A place to reach; the path is then planned."),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--start", metavar="X,Y", help="Where it begins; by default where the path does."
+        ),
+    ] = None,
+    world: Annotated[
+        Path | None,
+        typer.Option("--world", metavar="WORLD.toml", help="Obstacles: boxes on the ground."),
+    ] = None,
+    maze: Annotated[
+        bool, typer.Option("--maze", help="Obstacles: a random maze, drawn from the seed.")
+    ] = False,
+    seed: Seed = None,
+    fps: Fps = USUAL_FPS,
+    video: Video = True,
+    as_json: Json = False,
+) -> None:
+    """Walk along a sketched path around obstacles, or to a goal.
+
+    In a maze without a path it goes from corner to corner. Writes result.json, motion.npz,
+    motion.bvh, recording.html, filmstrip.png, plan.png and, where the machine can render,
+    video.mp4.
+    """
+    from dynresp.graphs.sketching import Asked, sketch_outing
+    from dynresp.graphs.world_file import read_world
+    from dynresp.locomotion.graph_file import load_graph
+    from dynresp.motion.character import default_character
+
+    asked = Asked(
+        path=read_points(points, path),
+        goal=None if goal is None else one_point(goal, "--goal"),
+        start=None if start is None else one_point(start, "--start"),
+        maze=maze,
+        seed=seed or 0,
+    )
+    loaded = load_graph(graph)
+    boxes = None if world is None else read_world(world)
+    check_folder(out)
+    with progress() as tell:
+        tell("looking for a way", 0, 1)
+        outing = sketch_outing(loaded, default_character(), asked, boxes, fps)
+    finish(out, loaded, outing, video, as_json)
+
+
+def read_points(text: str | None, file: Path | None) -> FloatArray | None:
+    """The corners of a path, given as text or in a file; None for none.
+
+    Raises:
+        UsageError: Both are given, or one is not what it should be.
+    """
+    import numpy as np
+
+    from dynresp.errors import UsageError
+
+    if text is not None and file is not None:
+        raise UsageError("give the path by --points or by --path, not by both")
+    if text is not None:
+        return np.array([one_point(word, "--points") for word in text.split()]).reshape(-1, 2)
+    if file is None:
+        return None
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(_MOST_BYTES + 1)
+        lines = data.decode("utf-8").splitlines()
+    except OSError as error:
+        raise UsageError(
+            f"--path: {file} cannot be read ({error.strerror}); expected lines of x, y [m]"
+        ) from None
+    except UnicodeDecodeError:
+        raise UsageError(f"--path: {file} is no text; expected lines of x, y [m]") from None
+    if len(data) > _MOST_BYTES:
+        raise UsageError(f"--path: {file} is larger than {_MOST_BYTES // 1024} KiB; no path is")
+    rows = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    return np.array([one_point(row, f"--path: {file}") for row in rows]).reshape(-1, 2)
+
+
+# Largest file of corners that is read [bytes]; and how far corners may be away [m].
+_MOST_BYTES = 1 << 20
+_FARTHEST = 10_000.0
+
+
+def one_point(text: str, where: str) -> tuple[float, float]:
+    """A point on the ground, from "x,y".
+
+    Raises:
+        UsageError: It is none.
+    """
+    from dynresp.errors import UsageError
+
+    words = text.split(",")
+    try:
+        x, y = (float(word) for word in words)
+    except ValueError:
+        raise UsageError(f"{where}: expected x,y in metres, got {text.strip()[:60]!r}") from None
+    if not max(abs(x), abs(y)) <= _FARTHEST:
+        raise UsageError(f"{where}: points must be within {_FARTHEST:g} m, got {text.strip()!r}")
+    return x, y

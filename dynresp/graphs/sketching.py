@@ -1,0 +1,144 @@
+"""An outing along a sketch: from what was asked to what the avatar did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynresp.errors import UsageError
+from dynresp.graphs.outing import Outing
+from dynresp.locomotion.composing import compose
+from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.search import SearchGraph, State
+from dynresp.locomotion.sketch import SketchedWalk, follow_sketch, reach
+from dynresp.locomotion.worlds.maze import random_maze
+from dynresp.locomotion.worlds.obstacles import World
+from dynresp.motion.character import Character
+from dynresp.motion.rotations import FloatArray
+from dynresp.view.story import Block, GroundPath
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What was asked of an avatar.
+
+    Attributes:
+        path: (k, 2) corners of the path to walk along [m]; None for none.
+        goal: Where to go instead [m].
+        start: Where it begins [m]; None for where the path does, else the origin.
+        maze: Whether it goes through a random maze; without path or goal from corner to corner.
+        seed: Of the maze.
+    """
+
+    path: FloatArray | None = None
+    goal: tuple[float, float] | None = None
+    start: tuple[float, float] | None = None
+    maze: bool = False
+    seed: int = 0
+
+
+def sketch_outing(
+    graph: MotionGraph,
+    character: Character,
+    asked: Asked,
+    world: World | None = None,
+    fps: float = 30.0,
+) -> Outing:
+    """Walk along a sketch.
+
+    Args:
+        graph: What is walked through.
+        character: Whose body it is.
+        asked: Where to.
+        world: Obstacles.
+        fps: Frame rate of the motion [1/s].
+
+    Raises:
+        UsageError: What was asked contradicts itself or lacks something.
+        DynrespError: There is no way between the obstacles.
+    """
+    path, goal, start = asked.path, asked.goal, asked.start
+    if asked.maze:
+        if world is not None:
+            raise UsageError("give obstacles by --world or by --maze, not by both")
+        maze = random_maze(np.random.default_rng(asked.seed))
+        world = maze.world
+        if path is None and goal is None:
+            goal = (float(maze.solution[-1, 0]), float(maze.solution[-1, 1]))
+        if path is None and start is None:
+            start = (float(maze.solution[0, 0]), float(maze.solution[0, 1]))
+    if (path is None) == (goal is None):
+        raise UsageError("give a path by --points or --path, or a place to reach by --goal")
+    if path is not None and len(path) < 2:
+        raise UsageError(f"a path needs two corners or more, got {len(path)}")
+    if start is None:
+        start = (0.0, 0.0) if path is None else (float(path[0, 0]), float(path[0, 1]))
+    search = SearchGraph(graph, character)
+    state = standing_at(graph, start, path[1] if path is not None else goal)
+    if path is not None:
+        walk = follow_sketch(search, state, path, world)
+    else:
+        assert goal is not None
+        walk = reach(search, state, goal, world)
+    composition = compose(graph, character, walk.frames, walk.placements[0], fps)
+    drawn = [] if path is None else [GroundPath("sketch", path)]
+    if path is None or world is not None:
+        drawn.append(GroundPath("path between the obstacles", walk.path))
+    mean = float(walk.off_path.mean())
+    seconds = (len(walk.frames) - 1) / graph.config.fps
+    return Outing(
+        title="A walk along a sketch" if path is not None else "A walk to a goal",
+        subtitle=f"{'arrived' if walk.arrived else 'did not arrive'}, on average {mean:.2f} m off "
+        "the path",
+        composition=composition,
+        blocks=blocks_of(world),
+        paths=drawn,
+        about={"sketch": _about(walk, seconds), "maze": asked.seed if asked.maze else None},
+    )
+
+
+def standing_at(graph: MotionGraph, start: tuple[float, float], towards: Any) -> State:
+    """A state at a place that faces another: a frame in which the avatar stands stillest.
+
+    Args:
+        graph: Whose frame.
+        start: The place [m].
+        towards: (2,) what it faces [m].
+    """
+    database = graph.database
+    frames = graph.frames
+    calm = np.abs(database.velocities[frames]).max(axis=1)
+    standing = database.contacts[frames, :2].all(axis=1)
+    calm = np.where(standing, calm, calm + 100.0)
+    frame = int(frames[np.argmin(calm)])
+    way = np.asarray(towards) - np.asarray(start)
+    return State.at(graph, frame, *start, float(np.arctan2(way[1], way[0])))
+
+
+def blocks_of(world: World | None) -> list[Block]:
+    """The boxes of a world as they are shown."""
+    if world is None:
+        return []
+    return [
+        Block((*box.center, 0.5 * box.height), (*box.half_sizes, 0.5 * box.height), yaw=box.yaw)
+        for box in world.obstacles
+    ]
+
+
+def _about(walk: SketchedWalk, seconds: float) -> dict[str, Any]:
+    """What `result.json` says of a walk along a sketch.
+
+    The time that planning took is left out: the same command gives the same bytes.
+    """
+    return {
+        "arrived": walk.arrived,
+        "off_path_mean_m": float(walk.off_path.mean()),
+        "off_path_worst_m": float(walk.off_path.max()),
+        "walking_s": seconds,
+        "ways_looked_at": walk.looked,
+        "ways_dropped_for_collisions": walk.collided,
+        "stretches_taken_back": walk.backtracks,
+        "places_closed": walk.detours,
+    }
