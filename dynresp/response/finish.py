@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from dynresp.motion.character import Character
 from dynresp.motion.floor import raise_above
+from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.ground import foot_contacts
+from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Trace
@@ -21,6 +26,12 @@ from dynresp.response.transition import (
     place_on,
 )
 
+Flags: TypeAlias = npt.NDArray[np.bool_]
+
+# Sine of the angle to the ground from which on the line from ankle to hip is that of a leg to stand
+# on.
+_STEEP = 0.5
+
 
 @dataclass(frozen=True)
 class Ending:
@@ -28,9 +39,10 @@ class Ending:
 
     Attributes:
         poses: (frames, 59) from the exit on: the blend, whose first pose is the simulated one,
-            and the motion entered, to its end.
+            and the motion entered, to its end; feet that stand in the blend do not slide.
         left: (59,) where the simulation was one frame after the exit.
-        joined: (59,) where the motion entered was one frame before the blend's end.
+        joined: (59,) where the motion entered was one frame before the blend's end, lowered as it
+            is at the end for feet to reach the ground.
     """
 
     poses: FloatArray
@@ -102,4 +114,74 @@ def ending(
     # Halfway between two poses that stand, legs can reach below the floor.
     blend = raise_above(character, blend_onto(simulated, placed[: length + 1]), fps)
     poses = np.concatenate([blend, placed[length + 1 :]])
-    return Ending(poses, simulated[1], placed[length - 1])
+    going_on = choice.name == CARRY_ON
+    fitted = _fitted(character, fps, simulated, placed, poses, going_on)
+    joined = placed[length - 1].copy()
+    # The root may be lowered by now, and stay so for a while.
+    joined[2] += fitted[length, 2] - placed[length, 2]
+    return Ending(fitted, simulated[1], joined)
+
+
+def _fitted(
+    character: Character,
+    fps: float,
+    simulated: FloatArray,
+    placed: FloatArray,
+    poses: FloatArray,
+    going_on: bool,
+) -> FloatArray:
+    """A blend, and what follows it, whose feet do not slide on account of the blend.
+
+    Args:
+        character: The character.
+        fps: Frame rate [1/s].
+        simulated: (blend + 1, 59) from the exit on.
+        placed: (frames, 59) the motion entered, from the exit on.
+        poses: (frames, 59) the blend of the two, and then the motion entered.
+        going_on: Whether that goes on after the last frame, so that nothing may be corrected there.
+    """
+    length = len(simulated) - 1
+    config = FitConfig()
+    contacts = _stances(*(_standing(character, x, fps) for x in (simulated, placed, poses)))
+    if going_on:
+        contacts[-config.fading(fps) :] = False
+    source = np.concatenate([simulated[:1], placed[1:]])
+    composed = Composed(poses, source, contacts, [1], fps, length / fps, fitted=poses[:1])
+    # A leg that is bent may reach below the floor in one who falls.
+    return raise_above(character, fit_feet(character, composed, config), fps)
+
+
+def _stances(before: Flags, entered: Flags, blended: Flags) -> Flags:
+    """When feet are to stand from the exit on (frames, 2).
+
+    Args:
+        before: Whether they stand in the simulation, from the exit to the blend's end.
+        entered: Whether they stand in the motion entered.
+        blended: Whether they stand in the blend of the two, and then in the motion entered.
+    """
+    entered, blended = entered.copy(), blended.copy()
+    entered[0] = blended[0] = before[0]
+    # A foot that stands at the exit goes on standing for as long as either says so. One that does
+    # not stands as soon as both do: the motion entered may have it on the ground where the
+    # simulation still has it in the air.
+    goes_on = np.logical_and.accumulate(entered) | np.logical_and.accumulate(blended)
+    stances: Flags = goes_on | (entered & blended)
+    # Those that begin after the blend are the recording's.
+    length = len(before) - 1
+    stances[length:] &= np.logical_and.accumulate(stances[length:])
+    return stances
+
+
+def _standing(character: Character, poses: FloatArray, fps: float) -> Flags:
+    """Which feet stand, and may carry, in poses (frames, 59): (frames, 2).
+
+    The legs of one who has fallen do not carry.
+    """
+    states = character.kinematics(poses)
+    steep = []
+    for side in FEET:
+        hip, ankle = (states.positions[:, character.body(f"{side}_{x}")] for x in ("thigh", "foot"))
+        way = hip - ankle
+        steep.append(way[:, 2] >= _STEEP * np.linalg.norm(way, axis=1))
+    flags: Flags = foot_contacts(character, states, fps) & np.stack(steep, axis=1)
+    return flags

@@ -12,9 +12,10 @@ import numpy as np
 
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
-from dynresp.motion.ground import clearances, sole_points
+from dynresp.motion.ground import clearances
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.motion.skating import foot_skates
 from dynresp.response.response import Response
 
 # A motion that stands still has hardly any joint speed steps; a seam is then measured against this
@@ -44,6 +45,8 @@ class Quality:
         root_shake_deg: The same of its orientation [degrees].
         foot_skate_m: Way that standing feet slide, from contact to the end, both feet [m].
         foot_skate_worst_m: The farthest that one foot slides in one stance [m].
+        foot_skate_blend_m: Way that standing feet slide in the blend, from exit to end, both feet
+            [m].
         foot_depth_m: How deep a foot gets into the ground, from contact to the end [m].
         body_depth_m: How deep any other body gets [m].
         free_physics_s: Time from contact to the exit [s].
@@ -60,6 +63,7 @@ class Quality:
     root_shake_deg: float
     foot_skate_m: float
     foot_skate_worst_m: float
+    foot_skate_blend_m: float
     foot_depth_m: float
     body_depth_m: float
     free_physics_s: float
@@ -89,6 +93,7 @@ def measure(response: Response, character: Character) -> Quality | None:
     depth = np.maximum(0.0, -clearances(character, states))
     feet = [character.body(f"{side}_foot") for side in FEET]
     skates = foot_skates(after, character)
+    blend = motion.slice(response.exit, response.end + 1)
     return Quality(
         speed_step_exit=at_seams[0],
         speed_step_end=at_seams[1],
@@ -100,6 +105,7 @@ def measure(response: Response, character: Character) -> Quality | None:
         root_shake_deg=max(shake[1] for shake in shakes),
         foot_skate_m=float(sum(skates)),
         foot_skate_worst_m=float(max(skates, default=0.0)),
+        foot_skate_blend_m=float(sum(foot_skates(blend, character))),
         foot_depth_m=float(depth[:, feet].max()),
         body_depth_m=float(np.delete(depth, feet, axis=1).max()),
         free_physics_s=(response.exit - response.contact_frame) / motion.fps,
@@ -147,33 +153,3 @@ def root_shake(motion: Motion, frame: int) -> tuple[float, float]:
         for before, step, after in (np.diff(near.root_positions, axis=0), turns)
     ]
     return found[0], float(np.degrees(found[1]))
-
-
-def foot_skates(motion: Motion, character: Character) -> list[float]:
-    """How far each foot slides in each of its stances [m].
-
-    The way over the ground of the sole's lowest corner, summed over the steps between frames in
-    both of which the foot stands (`motion.contacts`).
-    """
-    states = character.kinematics(motion.poses)
-    slides = []
-    for i, side in enumerate(FEET):
-        foot = character.body(f"{side}_foot")
-        corners = states.positions[:, foot, None] + rotations.rotate(
-            states.quaternions[:, foot, None], sole_points(character, side)
-        )
-        lowest = corners[:-1, :, 2].argmin(axis=1)
-        rows = np.arange(len(lowest))
-        moved = (corners[1:] - corners[:-1])[rows, lowest, :2]
-        slide = np.linalg.norm(moved, axis=-1)
-        standing = motion.contacts[:-1, i] & motion.contacts[1:, i]
-        total, inside = 0.0, False
-        for stands, way in zip(standing, slide, strict=True):
-            if stands:
-                total, inside = total + float(way), True
-            elif inside:
-                slides.append(total)
-                total, inside = 0.0, False
-        if inside:
-            slides.append(total)
-    return slides

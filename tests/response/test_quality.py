@@ -12,13 +12,11 @@ from hypothesis import strategies as st
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character
 from dynresp.motion.motion import FEET, Motion
-from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import PreparedImpact
 from dynresp.physics.scene import ImpactorKind
 from dynresp.physics.trace import Contact
 from dynresp.response.quality import (
     Quality,
-    foot_skates,
     joint_speed_steps,
     measure,
     root_shake,
@@ -180,66 +178,6 @@ class TestRootJump:
         assert moved.root_jump_deg == pytest.approx(math.degrees(0.02))
 
 
-class TestFootSkates:
-    """The way of standing feet over the ground."""
-
-    def _sliding(self, character: Character, path: FloatArray, contacts: FloatArray) -> Motion:
-        poses = turned(character, {}, len(path))
-        poses[:, :2] += path
-        return Motion(poses, FPS, contacts=contacts.astype(bool))
-
-    def test_still_feet_do_not_slide(self, character: Character) -> None:
-        motion = self._sliding(character, np.zeros((20, 2)), np.ones((20, 2)))
-        assert foot_skates(motion, character) == pytest.approx([0.0, 0.0])
-
-    def test_a_straight_slide_is_its_length(self, character: Character) -> None:
-        path = np.outer(np.linspace(0.0, 0.5, 11), [0.6, 0.8])
-        contacts = np.ones((11, 2))
-        assert foot_skates(self._sliding(character, path, contacts), character) == pytest.approx(
-            [0.5, 0.5]
-        )
-
-    def test_there_and_back_is_both_ways(self, character: Character) -> None:
-        path = np.zeros((21, 2))
-        path[:, 0] = np.abs(np.arange(21) - 10) * 0.01
-        slides = foot_skates(self._sliding(character, path, np.ones((21, 2))), character)
-        assert slides == pytest.approx([0.2, 0.2])
-
-    def test_only_steps_between_standing_frames_count(self, character: Character) -> None:
-        path = np.outer(np.arange(20), [0.01, 0.0])
-        contacts = np.zeros((20, 2))
-        contacts[2:6, 0] = contacts[10:18, 0] = 1
-        contacts[5, 1] = 1  # one frame alone has no step
-        slides = foot_skates(self._sliding(character, path, contacts), character)
-        assert slides == pytest.approx([0.03, 0.07])
-
-    def test_a_stance_that_lasts_to_the_end_counts(self, character: Character) -> None:
-        path = np.outer(np.arange(10), [0.0, 0.02])
-        contacts = np.zeros((10, 2))
-        contacts[4:, 1] = 1
-        slides = foot_skates(self._sliding(character, path, contacts), character)
-        assert slides == pytest.approx([0.1])
-
-    def test_rolling_over_the_heel_is_no_slide(self, character: Character) -> None:
-        """A foot that turns about its lowest corner stays there."""
-        angles = np.linspace(-0.3, -0.1, 8)
-        poses = turned(character, {}, 8)
-        poses[:, ROOT_QUAT] = rotations.about_axis((0, 1, 0), angles)
-        poses[:, 2] = 1.0
-        motion = Motion(poses, FPS, contacts=np.ones((8, 2), dtype=bool))
-        rows = []
-        for pose in motion.poses:
-            origins, matrices, _ = kinematics.body_frames(character, pose)
-            foot = character.body("left_foot")
-            geom = character.model.geom("left_sole")
-            heel = geom.pos + geom.size * np.array([-1.0, -1.0, -1.0])
-            rows.append(origins[foot] + matrices[foot] @ heel)
-        pinned = motion.poses.copy()
-        pinned[:, :3] -= np.array(rows) - rows[0]
-        slides = foot_skates(Motion(pinned, FPS, contacts=np.array([[True, False]] * 8)), character)
-        assert slides == pytest.approx([0.0], abs=1e-9)
-
-
 class TestMeasure:
     """A whole response."""
 
@@ -289,6 +227,13 @@ class TestMeasure:
         way = (len(poses) - 1 - 11) * 0.002
         assert quality.foot_skate_m == pytest.approx(2.0 * way)
         assert quality.foot_skate_worst_m == pytest.approx(way)
+
+    def test_the_blend_s_own_skate(self, character: Character) -> None:
+        poses = standing(character, 2.0).poses.copy()
+        poses[:, 0] += np.cumsum(np.arange(len(poses)) > 24) * 0.002
+        motion = Motion(poses, FPS, contacts=np.ones((len(poses), 2), dtype=bool))
+        quality = _measured(_response(motion, 11, 20, 30), character)
+        assert quality.foot_skate_blend_m == pytest.approx(2 * 6 * 0.002)
 
     @pytest.mark.parametrize(("seam", "name"), [(20, "exit"), (32, "end")])
     def test_a_kick_at_a_seam_is_found_there(

@@ -60,7 +60,8 @@ class TestNothingHappens:
         assert response.error < 0.1
         shown = min(len(response.motion), len(base))
         assert shown > response.end  # type: ignore[operator]
-        same_poses(response.motion.poses[:shown], base.poses[:shown], 0.005)
+        # Knees as straight as the model's own bend by 4 degrees where a foot is held at all.
+        same_poses(response.motion.poses[:shown], base.poses[:shown], 0.0075)
 
     def test_a_carried_on_motion_goes_on_by_the_clock(
         self, character: Character, responder: Responder
