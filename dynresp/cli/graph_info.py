@@ -43,6 +43,7 @@ def graph_facts(graph: MotionGraph) -> dict[str, Any]:
             "contact": counts.contact,
             "likelihood": counts.likelihood,
             "similarity": counts.similarity,
+            "footing": counts.footing,
             "component": counts.component,
         },
         "jumps_a_frame": counts.component / max(counts.component_frames, 1),
@@ -63,7 +64,7 @@ def tell_graph(graph: MotionGraph, path: Path, as_json: bool) -> str:
     similarity = "not in force" if left["similarity"] is None else f"{left['similarity']:,}"
     lines = [
         f"{path}  {facts['identity']}",
-        f"  {facts['frames']:,} frames at {facts['fps']:g} fps ({facts['seconds'] / 60:.1f} min) of "
+        f"  {facts['frames']:,} frames at {facts['fps']:g} fps ({facts['seconds'] / 60:.1f} min), "
         f"{facts['clips']} clips, {facts['coordinates']} coordinates",
         f"  {facts['frames_in_component']:,} frames in the one component, "
         f"{facts['jumps_a_frame']:.1f} jumps a frame",
@@ -72,6 +73,7 @@ def tell_graph(graph: MotionGraph, path: Path, as_json: bool) -> str:
         f"    contact          {left['contact']:>15,}",
         f"    likelihood       {left['likelihood']:>15,}",
         f"    similarity       {similarity:>15}",
+        f"    footing          {left['footing']:>15,}",
         f"    component        {left['component']:>15,}",
     ]
     if facts["built_in_clips"]:

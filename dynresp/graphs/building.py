@@ -58,7 +58,7 @@ def build_graph(
             owed[about["credit"]] = None
     progress("comparing frames", 0, 1)
     return MotionGraph.build(
-        motions, plan.graph.config(), character, credits=tuple(owed), threads=threads
+        motions, plan.graph.config(), character, owed_to=tuple(owed), threads=threads
     )
 
 

@@ -90,7 +90,7 @@ class MotionDatabase:
         fps: float = 15.0,
         mirrored: bool = False,
         contacts: Sequence[BoolArray] | None = None,
-        credits: tuple[str, ...] = (),
+        owed_to: tuple[str, ...] = (),
     ) -> MotionDatabase:
         """Bring motions to one frame rate and lay them end to end.
 
@@ -104,7 +104,7 @@ class MotionDatabase:
             mirrored: Whether every motion is followed by its mirror image.
             contacts: For each motion (frames, 2 or 4) what touches the environment, at the
                 motion's own rate; by default the motions' foot contacts.
-            credits: To whom they are owed, a line each.
+            owed_to: `credits` of the database.
 
         Raises:
             MotionError: There is no motion long enough.
@@ -148,7 +148,7 @@ class MotionDatabase:
             fps,
             tuple(clips),
             character.identity,
-            credits,
+            owed_to,
         )
 
     def __len__(self) -> int:

@@ -18,8 +18,10 @@ from dynresp.errors import MotionError
 from dynresp.locomotion import placement
 from dynresp.locomotion.database import BoolArray, IntArray, MotionDatabase
 from dynresp.locomotion.graph_config import Coordinates, GraphConfig
+from dynresp.motion import legs, rotations
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.motion import Motion
+from dynresp.motion.contact_cases import ContactCase, contact_cases
+from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 
 
@@ -33,6 +35,7 @@ class PruningCounts:
         contact: Jumps left by the first rule, similar contacts.
         likelihood: By the second, a probability above the threshold.
         similarity: By the third, local maxima; None where it is not in force.
+        footing: By that of the feet: no foot would have to slip through a whole blend.
         component: By the fourth, inside the largest strongly connected component.
         component_frames: Frames of that component.
     """
@@ -42,6 +45,7 @@ class PruningCounts:
     contact: int
     likelihood: int
     similarity: int | None
+    footing: int
     component: int
     component_frames: int
 
@@ -83,7 +87,7 @@ class MotionGraph:
         config: GraphConfig | None = None,
         character: Character | None = None,
         contacts: Sequence[BoolArray] | None = None,
-        credits: tuple[str, ...] = (),
+        owed_to: tuple[str, ...] = (),
         threads: int = 0,
     ) -> MotionGraph:
         """Make a graph of motions.
@@ -93,7 +97,7 @@ class MotionGraph:
             config: Settings.
             character: Whose motions they are, by default the product's own.
             contacts: See `MotionDatabase.gather`.
-            credits: To whom the motions are owed, a line each.
+            owed_to: `MotionDatabase.credits`.
             threads: Threads, 0 for all cores; the graph is the same bit for bit.
 
         Raises:
@@ -102,15 +106,25 @@ class MotionGraph:
         config = config or GraphConfig()
         character = character or default_character()
         database = MotionDatabase.gather(
-            motions, character, config.fps, config.mirrored, contacts, credits
+            motions, character, config.fps, config.mirrored, contacts, owed_to
         )
-        return cls.of(database, config, threads)
+        return cls.of(database, config, character, threads)
 
     @classmethod
     def of(
-        cls, database: MotionDatabase, config: GraphConfig | None = None, threads: int = 0
+        cls,
+        database: MotionDatabase,
+        config: GraphConfig | None = None,
+        character: Character | None = None,
+        threads: int = 0,
     ) -> MotionGraph:
         """Make a graph of a database that is at the configuration's frame rate already.
+
+        Args:
+            database: The frames.
+            config: Settings.
+            character: Whose motions they are, by default the product's own.
+            threads: Threads, 0 for all cores; the graph is the same bit for bit.
 
         Raises:
             MotionError: The frame rates differ, or no way is left.
@@ -125,6 +139,9 @@ class MotionGraph:
             )
         found = find_transitions(database, config, threads)
         sources, targets, distances = found.sources, found.targets, found.distances
+        kept = keeps_its_feet(database, config, character or default_character(), sources, targets)
+        sources, targets, distances = sources[kept], targets[kept], distances[kept]
+        footing = len(sources)
         inside = _largest_component(database.successors, sources, targets)
         kept = inside[sources] & inside[targets]
         sources, targets, distances = sources[kept], targets[kept], distances[kept]
@@ -139,6 +156,7 @@ class MotionGraph:
             contact=found.contact,
             likelihood=found.likelihood,
             similarity=found.similarity,
+            footing=footing,
             component=len(sources),
             component_frames=int(np.count_nonzero(inside)),
         )
@@ -225,6 +243,47 @@ def between(left: FloatArray, matched: FloatArray, config: GraphConfig) -> Float
     turns[:, :3] = np.round(shift[:, :3] / cell) * cell
     turns[:, 3] = placement.wrapped(turns[:, 3])
     return turns
+
+
+def keeps_its_feet(
+    database: MotionDatabase,
+    config: GraphConfig,
+    character: Character,
+    sources: IntArray,
+    targets: IntArray,
+) -> BoolArray:
+    """Which jumps ask no foot to slip through the whole blend, the paper's case 4 (section 4.1.1).
+
+    A foot that is lifted during the blend is put where it belongs next; one that stands from
+    before the jump to the blend's end can only slip, or stay where it should not.
+
+    Args:
+        database: The frames.
+        config: Length of the blend, how far a foot may slip, and in what world it stands.
+        character: Whose feet.
+        sources: (m,) frames left.
+        targets: (m,) frames entered.
+
+    Returns:
+        (m,).
+    """
+    ends = np.array([clip.stop for clip in database.clips])[database.clip_of]
+    blend = max(1, round(config.blend_s * config.fps))
+    cases = contact_cases(database.contacts[:, :2], ends, sources, targets, blend)
+    kept = np.ones(len(sources), dtype=bool)
+    across = np.flatnonzero((cases == ContactCase.ACROSS).any(axis=1))
+    if len(across) == 0:
+        return kept
+    left, matched = sources[across], targets[across] - 1
+    moves = between(database.planar[left], database.planar[matched], config)
+    ankles = legs.ankle_positions(character, character.kinematics(database.poses))
+    turns = rotations.from_yaw(moves[:, 3])
+    for foot in range(len(FEET)):
+        there = rotations.rotate(turns, ankles[matched, foot]) + moves[:, :3]
+        apart = np.linalg.norm((there - ankles[left, foot])[:, :2], axis=1)
+        stands = cases[across, foot] == ContactCase.ACROSS
+        kept[across] &= ~(stands & (apart > config.slip_m))
+    return kept
 
 
 def _largest_component(successors: IntArray, sources: IntArray, targets: IntArray) -> BoolArray:

@@ -38,6 +38,8 @@ class GraphConfig:
         local_maxima: Whether of neighbouring jumps only the best stays, the third rule. None
             does what the paper does: not where contact_change already leaves single ones.
         stutter_s: Jumps within a clip that skip or repeat less than this are none [s].
+        slip_m: A jump is dropped if a foot stands from before it to beyond its blend (the paper's
+            case 4) in places that lie farther than this apart [m].
         blend_s: Time over which a jump is blended [s]; 1 to 2 in the paper.
         blend_rate_s: Time over which the difference in velocity at a jump goes, at most blend_s
             [s]. The paper has one time for both; but a joint that is 3 rad/s faster when it is
@@ -56,6 +58,7 @@ class GraphConfig:
     velocity_weight: float = 0.0225
     local_maxima: bool | None = None
     stutter_s: float = 0.25
+    slip_m: float = 0.03
     blend_s: float = 1.0
     blend_rate_s: float = 0.3
     block_m: float = 0.6096
@@ -71,7 +74,7 @@ class GraphConfig:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise UsageError(f"{name} must be above 0, got {value}")
-        for name in ("velocity_weight", "stutter_s"):
+        for name in ("velocity_weight", "stutter_s", "slip_m"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise UsageError(f"{name} must be 0 or more, got {value}")

@@ -7,7 +7,7 @@ member            dtype    shape            what it holds
 ``character``     text     ()               `Character.identity` of the character that moves
 ``identity``      text     ()               hash of frames, configuration and ways
 ``config``        text     ()               the configuration, as JSON
-``counts``        int64    (7,)             `PruningCounts` in its order; -1 for None
+``counts``        int64    (8,)             `PruningCounts` in its order; -1 for None
 ``poses``         float64  (frames, 59)     rows of `qpos`
 ``contacts``      bool     (frames, 2 or 4) as two members: ``feet`` and ``hands``
 ``clip_names``    text     (clips,)         names of the motions
@@ -49,7 +49,7 @@ FORMAT = ArchiveFormat(
         "character": (TEXT, ()),
         "identity": (TEXT, ()),
         "config": (TEXT, ()),
-        "counts": ("<i8", (7,)),
+        "counts": ("<i8", (8,)),
         "poses": ("<f8", ("frames", POSE_SIZE)),
         "feet": ("|b1", ("frames", 2)),
         "hands": ("|b1", ("hands", 2)),
@@ -212,7 +212,7 @@ def _graph(arrays: Arrays) -> MotionGraph:
         raise ValueError("a jump leads to the first frame of a clip")
     considered, pairs, contact, likelihood, similarity, *rest = (int(x) for x in arrays["counts"])
     kept = None if similarity < 0 else similarity
-    told = PruningCounts(considered, pairs, contact, likelihood, kept, rest[0], rest[1])
+    told = PruningCounts(considered, pairs, contact, likelihood, kept, rest[0], rest[1], rest[2])
     return MotionGraph(
         database, config, told, offsets.astype(np.int64), targets.astype(np.int32),
         distances.astype(np.float32),
