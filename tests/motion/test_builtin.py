@@ -56,6 +56,7 @@ def test_base_motions_and_every_strategy_are_there() -> None:
     kinds = {name: builtin_info(name).kind for name in NAMES}
     for name in ("walk", "idle", "guard", "punch"):
         assert kinds[name] == name
+    assert all(kinds[name] == "locomotion" for name in ("stroll", "footwork", "stool"))
     given = [str(builtin_info(name).strategy) for name in NAMES if kinds[name] == "reaction"]
     assert sorted(given) == sorted(STRATEGIES)
     assert len(STRATEGIES) == 12
@@ -125,6 +126,10 @@ def test_feet_ease_into_and_out_of_standing(character: Character) -> None:
 def test_durations() -> None:
     for name in NAMES:
         info, length = builtin_info(name), load_builtin(name).duration
+        if info.kind == "locomotion":
+            assert length >= 60.0
+            assert load_builtin(name).fps == 30.0
+            continue
         if info.kind in ("walk", "idle", "guard"):
             assert length >= 10.0
         elif info.kind == "reaction":

@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from dynresp.motion import legs, rotations
 from dynresp.motion.builtin.footing import FootTrack, Sole, place_feet, planted
-from dynresp.motion.builtin.keypose_spec import CHANNELS, CYCLE_POINTS, BuiltinSpec, Gait
+from dynresp.motion.builtin.keypose_spec import CYCLE_POINTS, BuiltinSpec, Gait
 from dynresp.motion.builtin.keyposes import add_sway, channel_poses, frame_times
+from dynresp.motion.builtin.posture_spec import CHANNELS
 from dynresp.motion.character import Character
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray

@@ -11,122 +11,43 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from dynresp.errors import SpecError, UnknownNameError
+from dynresp.motion.builtin.course_spec import Course, Jump, Stay, Step
+from dynresp.motion.builtin.posture_spec import (
+    CHANNELS,
+    Limb,
+    Pelvis,
+    Place,
+    Posture,
+    Side,
+    Strict,
+    Trunk,
+)
 from dynresp.motion.strategies import Strategy
 
-Side = Literal["left", "right"]
-Kind = Literal["walk", "idle", "guard", "punch", "reaction"]
+Kind = Literal["walk", "idle", "guard", "punch", "locomotion", "reaction"]
 
 MAX_DURATION = 120.0
 """Longest motion that a file may describe [s]."""
 CYCLE_POINTS = 20
 """Values of a gait curve, one for every 5 % of the cycle."""
 
-CHANNELS: tuple[str, ...] = (
-    *(f"pelvis.{x}" for x in ("x", "y", "height", "pitch", "roll", "yaw")),
-    *(f"{x}.{y}" for x in ("waist", "back", "neck") for y in ("flexion", "lateral", "rotation")),
-    *(
-        f"{side}_{joint}.{x}"
-        for side in ("left", "right")
-        for joint in ("hip", "shoulder")
-        for x in ("flexion", "abduction", "rotation")
-    ),
-    *(f"{side}_{x}" for side in ("left", "right") for x in ("knee", "ankle", "elbow")),
-)
-"""Every value that key poses set and sways move."""
-
 Time = Annotated[float, Field(ge=0.0, le=MAX_DURATION)]
-Place = Annotated[float, Field(ge=-100.0, le=100.0)]
-Turn = Annotated[float, Field(ge=-720.0, le=720.0)]
-KneeAngle = Annotated[float, Field(ge=-5.0, le=158.0)]
-ElbowAngle = Annotated[float, Field(ge=-5.0, le=153.0)]
-AnkleAngle = Annotated[float, Field(ge=-60.0, le=45.0)]
 Curve = Annotated[
     list[Annotated[float, Field(ge=-180.0, le=180.0)]],
     Field(min_length=CYCLE_POINTS, max_length=CYCLE_POINTS),
 ]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-
-class Pelvis(_Strict):
-    """Where the pelvis is [m] and how it is turned [deg]; what is left out is not keyed."""
-
-    x: Place | None = None
-    y: Place | None = None
-    height: Annotated[float, Field(ge=-1.0, le=3.0)] | None = None
-    pitch: Turn | None = None
-    roll: Turn | None = None
-    yaw: Turn | None = None
-
-
-class Trunk(_Strict):
-    """Waist, back or neck [deg]: bent forward, to the left, turned to the left."""
-
-    flexion: Annotated[float, Field(ge=-60.0, le=75.0)] | None = None
-    lateral: Annotated[float, Field(ge=-60.0, le=60.0)] | None = None
-    rotation: Annotated[float, Field(ge=-75.0, le=75.0)] | None = None
-
-
-class Limb(_Strict):
-    """Hip or shoulder [deg]: swung forward, away from the body, turned outward."""
-
-    flexion: Annotated[float, Field(ge=-90.0, le=180.0)] | None = None
-    abduction: Annotated[float, Field(ge=-70.0, le=180.0)] | None = None
-    rotation: Annotated[float, Field(ge=-120.0, le=120.0)] | None = None
-
-
-class Key(_Strict):
-    """A key pose: the angles that are set at one time. Plural names set both sides alike."""
+class Key(Posture):
+    """A key pose: the posture at one time."""
 
     time: Time
-    pelvis: Pelvis | None = None
-    waist: Trunk | None = None
-    back: Trunk | None = None
-    neck: Trunk | None = None
-    hips: Limb | None = None
-    left_hip: Limb | None = None
-    right_hip: Limb | None = None
-    knees: KneeAngle | None = None
-    left_knee: KneeAngle | None = None
-    right_knee: KneeAngle | None = None
-    ankles: AnkleAngle | None = None
-    left_ankle: AnkleAngle | None = None
-    right_ankle: AnkleAngle | None = None
-    shoulders: Limb | None = None
-    left_shoulder: Limb | None = None
-    right_shoulder: Limb | None = None
-    elbows: ElbowAngle | None = None
-    left_elbow: ElbowAngle | None = None
-    right_elbow: ElbowAngle | None = None
-
-    def channels(self) -> dict[str, float]:
-        """The values this key sets, under names such as "left_hip.flexion" or "left_knee"."""
-        given = self.model_dump(exclude_none=True, exclude={"time"})
-        values: dict[str, float] = {}
-        # Plural names first, so that a side's own value stands above what is said of both.
-        for part in sorted(given, key=lambda name: name not in PLURALS):
-            for target in PLURALS.get(part, (part,)):
-                value = given[part]
-                if isinstance(value, Mapping):
-                    values |= {f"{target}.{angle}": number for angle, number in value.items()}
-                else:
-                    values[target] = value
-        return values
 
 
-PLURALS: Mapping[str, tuple[str, str]] = {
-    f"{part}s": (f"left_{part}", f"right_{part}")
-    for part in ("hip", "knee", "ankle", "shoulder", "elbow")
-}
-"""Names that set both sides, and the two that they stand for."""
-
-
-class _Span(_Strict):
+class _Span(Strict):
     start: Time = Field(alias="from")
     stop: Time = Field(alias="to")
 
@@ -178,7 +99,7 @@ class Lying(_Span):
     ease: Annotated[float, Field(gt=0.0, le=1.0)] = 0.12
 
 
-class Sway(_Strict):
+class Sway(Strict):
     """A slow oscillation added to one value: amplitude * sin(2 pi (t / period + phase))."""
 
     value: str
@@ -193,7 +114,7 @@ class Sway(_Strict):
         return self
 
 
-class Gait(_Strict):
+class Gait(Strict):
     """Numbers of a steady walk.
 
     Attributes:
@@ -219,7 +140,7 @@ class Gait(_Strict):
     height: Annotated[float, Field(ge=0.5, le=1.2)]
 
 
-class Curves(_Strict):
+class Curves(Strict):
     """Curves over the gait cycle, one value every 5 % from the left heel's touch-down.
 
     Limbs are given for the left side; the right side is half a cycle later. [deg], and [cm] for
@@ -244,7 +165,7 @@ class Curves(_Strict):
     neck_rotation: Curve
 
 
-class BuiltinSpec(_Strict):
+class BuiltinSpec(Strict):
     """A whole file."""
 
     name: Annotated[str, Field(min_length=1, max_length=80)]
@@ -253,13 +174,14 @@ class BuiltinSpec(_Strict):
     what: Annotated[str, Field(min_length=1)]
     source: str = ""
     fps: Annotated[float, Field(ge=10.0, le=240.0)] = 60.0
-    key: list[Key] = []
-    stance: list[Stance] = []
-    lying: list[Lying] = []
-    sway: list[Sway] = []
+    key: list[Key] = Field(default_factory=list)
+    stance: list[Stance] = Field(default_factory=list)
+    lying: list[Lying] = Field(default_factory=list)
+    sway: list[Sway] = Field(default_factory=list)
     gait: Gait | None = None
     curves: Curves | None = None
     rest: Key | None = None
+    course: Course | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> BuiltinSpec:
@@ -267,6 +189,12 @@ class BuiltinSpec(_Strict):
             raise ValueError("'strategy' belongs to kind 'reaction', and only to it")
         if (self.gait is None) != (self.curves is None):
             raise ValueError("[gait] and [curves] belong together")
+        if (self.kind == "locomotion") != (self.course is not None):
+            raise ValueError("[course] belongs to kind 'locomotion', and only to it")
+        if self.course is not None:
+            if self.gait or self.rest or self.key or self.stance or self.lying:
+                raise ValueError("a file with [course] takes [[sway]] besides, and nothing else")
+            return self
         if self.gait is not None:
             if self.key or self.stance or self.lying:
                 raise ValueError("a file with [gait] takes no [[key]], [[stance]] or [[lying]]")
@@ -337,6 +265,11 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "sway": Sway,
     "gait": Gait,
     "curves": Curves,
+    "course": Course,
+    "step": Step,
+    "stay": Stay,
+    "jump": Jump,
+    "posture": Posture,
     **dict.fromkeys(("waist", "back", "neck"), Trunk),
     **dict.fromkeys(
         ("hips", "left_hip", "right_hip", "shoulders", "left_shoulder", "right_shoulder"), Limb
@@ -363,6 +296,10 @@ def _explain(error: dict[str, Any]) -> str:
 
 def _location(parts: tuple[int | str, ...]) -> str:
     """A place in the file as a person counts: "key 3: left_hip.flexion"."""
+    if len(parts) > 3 and parts[:2] == ("course", "phrases") and isinstance(parts[3], int):
+        # The kind of the move stands between its number and what is wrong in it.
+        inner = ".".join(str(part) for part in parts[5:])
+        return f"{parts[2]}: move {parts[3] + 1}" + (f": {inner}" if inner else "")
     if len(parts) > 1 and isinstance(parts[1], int):
         inner = ".".join(str(part) for part in parts[2:])
         return f"{parts[0]} {parts[1] + 1}" + (f": {inner}" if inner else "")

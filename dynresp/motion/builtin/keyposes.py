@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion import rotations
-from dynresp.motion.builtin.keypose_spec import CHANNELS, BuiltinSpec
+from dynresp.motion.builtin.keypose_spec import BuiltinSpec
+from dynresp.motion.builtin.posture_spec import CHANNELS
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.rotations import FloatArray
 

@@ -1,8 +1,8 @@
 """The motions that dynresp makes itself, so that all of it works without any motion capture.
 
-Each is a file of `reactions/builtin`: a walk from published gait curves, and key poses with
-timing, which splines and inverse kinematics turn into motion. They stand in until real motion
-capture is there, and are named "built-in" wherever they appear.
+Each is a file of `reactions/builtin`: a walk from published gait curves, key poses with timing,
+which splines and inverse kinematics turn into motion, and courses, which are planned step by step.
+They stand in until real motion capture is there, and are named "built-in" wherever they appear.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dynresp.errors import UnknownNameError
 from dynresp.motion import ground
 from dynresp.motion.character import Character, default_character
@@ -19,12 +21,15 @@ from dynresp.motion.motion import Label, Motion
 from dynresp.paths import reactions_folder
 
 if TYPE_CHECKING:
+    from dynresp.motion.builtin.course_spec import Course
     from dynresp.motion.builtin.footing import FootTrack
     from dynresp.motion.builtin.keypose_spec import BuiltinSpec
     from dynresp.motion.rotations import FloatArray
 
 PREFIX = "built-in: "
 """How the name of a built-in motion begins."""
+FLAT = ("walk", "stroll", "footwork")
+"""Slugs of those that go about on level ground: enough for a motion graph without any recording."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,8 @@ class BuiltinInfo:
     Attributes:
         slug: What `load_builtin` takes: its file's name without ".toml".
         name: For people.
-        kind: "walk", "idle", "guard" or "punch" for base motions, "reaction" for the others.
+        kind: "walk", "idle", "guard", "punch" or "locomotion" for base motions, "reaction" for the
+            others.
         strategy: Of a reaction, such as "side_fall"; None for a base motion.
         what: What happens in it.
         source: Where its numbers come from; empty where they were made up by hand.
@@ -77,8 +83,9 @@ def load_builtin(name: str, character: Character | None = None) -> Motion:
         character: The product's own by default.
 
     Returns:
-        The motion, facing +X at its start, on the floor z = 0, named "built-in: ...", with foot
-        contacts; a reaction bears its strategy as a label.
+        The motion, facing +X at its start, on the floor z = 0 (that about the stool also on the
+        stool), named "built-in: ...", with foot contacts. A reaction bears its strategy as a
+        label; one that is planned step by step bears the names of its phrases, such as "sit".
 
     Raises:
         UnknownNameError: There is no such built-in motion.
@@ -89,17 +96,24 @@ def load_builtin(name: str, character: Character | None = None) -> Motion:
 
 def make_motion(spec: BuiltinSpec, character: Character) -> Motion:
     """Turn a file's contents into a motion."""
-    poses, _ = make_poses(spec, character)
+    poses, tracks = make_poses(spec, character)
+    name = PREFIX + spec.name
+    if spec.course is not None:
+        # Not all of its feet stand on the floor z = 0, and where they stand is planned.
+        planned = np.stack([track.locked for track in tracks], axis=1)
+        return Motion(poses, spec.fps, name, planned, _phrases(spec.course, spec.fps, len(poses)))
     states = character.kinematics(poses)
     contacts = ground.foot_contacts(character, states, spec.fps)
     label = Label(spec.strategy or spec.kind, 0, len(poses))
-    return Motion(poses, spec.fps, PREFIX + spec.name, contacts, (label,))
+    return Motion(poses, spec.fps, name, contacts, (label,))
 
 
 def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
     """Poses (frames, 59) of a file, and where its left and right foot were to be."""
-    from dynresp.motion.builtin import footing, gait, keyposes
+    from dynresp.motion.builtin import course, footing, gait, keyposes
 
+    if spec.course is not None:
+        return course.course_poses(spec, character)
     if spec.gait is not None:
         return gait.walk_poses(spec, character)
     times, channels = keyposes.key_channels(spec, character)
@@ -114,6 +128,16 @@ def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, lis
         placed = footing.place_feet(character, poses, tracks, spec.fps)
         poses = footing.rest_on_ground(character, poses, placed, spec.lying, spec.fps)
     return footing.place_feet(character, poses, tracks, spec.fps), tracks
+
+
+def _phrases(course: Course, fps: float, frames: int) -> tuple[Label, ...]:
+    """A label for each phrase of a route."""
+    from dynresp.motion.builtin.course_plan import plan_course
+
+    return tuple(
+        Label(name, round(start * fps), min(round(stop * fps), frames))
+        for name, start, stop in plan_course(course).phrases
+    )
 
 
 def _file_of(name: str) -> Path:
