@@ -1,0 +1,1 @@
+"""Worlds an avatar walks in: obstacles, mazes, and paths through them."""
