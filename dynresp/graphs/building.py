@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from dynresp.errors import MissingMotionDataError
 from dynresp.experiments.motions import about_cut, find_motion, load_cut
 from dynresp.experiments.spec import MotionCut
 from dynresp.graphs.plan import GraphPlan
+from dynresp.graphs.worlds import lay_out
+from dynresp.locomotion.database import MotionDatabase
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
@@ -56,10 +59,15 @@ def build_graph(
         about = about_cut(cut, where)
         if "credit" in about:
             owed[about["credit"]] = None
+    progress("finding contacts", 0, 1)
+    laid = lay_out(plan.graph.world, motions, character)
     progress("comparing frames", 0, 1)
-    return MotionGraph.build(
-        motions, plan.graph.config(), character, owed_to=tuple(owed), threads=threads
+    config = plan.graph.config()
+    database = MotionDatabase.gather(
+        laid.motions, character, config.fps, config.mirrored, laid.contacts, tuple(owed)
     )
+    database = replace(database, world=plan.graph.world)
+    return MotionGraph.of(database, config, character, threads)
 
 
 def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:

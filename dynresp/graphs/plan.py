@@ -13,6 +13,7 @@ from dynresp.experiments.mistakes import explain_in_tables, read_toml, validate
 from dynresp.experiments.spec import MotionCut, Strict
 from dynresp.experiments.values import fixed
 from dynresp.locomotion.graph_config import Coordinates, GraphConfig
+from dynresp.locomotion.worlds.terrain import LEVEL_M
 from dynresp.motion.collection import GRAPHS
 from dynresp.paths import examples_folder
 
@@ -20,8 +21,19 @@ WorldName = Literal["flat", "terrain", "stool", "playground"]
 """Where the motions were recorded; it says what counts as a contact."""
 
 
+_COORDINATES: dict[str, str] = {
+    "flat": "relative",
+    "terrain": "blocks",
+    "stool": "fixed",
+    "playground": "fixed",
+}
+
+
 class GraphTable(Strict):
-    """`[graph]`: its name, its world, and settings; what is left out is as in `GraphConfig`."""
+    """`[graph]`: its name, its world, and settings.
+
+    What is left out is as in `GraphConfig`, but for the coordinates, which go with the world.
+    """
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
     world: WorldName = "flat"
@@ -29,6 +41,7 @@ class GraphTable(Strict):
     mirrored: bool = False
     coordinates: Literal["relative", "fixed", "blocks"] | None = None
     contact_change: bool | None = None
+    slip_m: Annotated[float | None, fixed(0.0, 10.0, "m")] = None
     local_maxima: bool | None = None
     sigma: Annotated[float | None, fixed(1e-6, 1e3)] = None
     least_probability: Annotated[float | None, fixed(1e-9, 0.999)] = None
@@ -44,8 +57,9 @@ class GraphTable(Strict):
             UsageError: They contradict each other.
         """
         said = self.model_dump(exclude={"name", "world"}, exclude_none=True)
-        if self.coordinates is not None:
-            said["coordinates"] = Coordinates(self.coordinates)
+        said["coordinates"] = Coordinates(self.coordinates or _COORDINATES[self.world])
+        if self.world == "terrain":
+            said["block_height_m"] = LEVEL_M
         if self.blend_s is not None and self.blend_rate_s is None:
             said["blend_rate_s"] = min(self.blend_s, GraphConfig.blend_rate_s)
         return GraphConfig(**said)

@@ -53,6 +53,7 @@ class MotionDatabase:
         clips: The clips, in the order of their frames.
         character: `Character.identity` of the character.
         credits: To whom the motions are owed, a line each.
+        world: Name of the world that they were recorded in; "flat" is level ground.
 
     Raises:
         MotionError: Shapes do not fit together, or there is no frame.
@@ -64,6 +65,7 @@ class MotionDatabase:
     clips: tuple[Clip, ...]
     character: str
     credits: tuple[str, ...] = ()
+    world: str = "flat"
 
     def __post_init__(self) -> None:
         """Check and freeze the arrays."""

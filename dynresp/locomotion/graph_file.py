@@ -14,6 +14,7 @@ member            dtype    shape            what it holds
 ``clip_hashes``   text     (clips,)         identities of the motions (`motion_identity`)
 ``clip_stops``    int64    (clips,)         one past each clip's last frame
 ``credits``       text     (credits,)       to whom the motions are owed
+``world``         text     ()               name of the world they were recorded in
 ``offsets``       int64    (frames + 1,)    where the rows of ways begin
 ``targets``       int32    (ways,)          where the ways lead
 ``distances``     float32  (ways,)          their distances
@@ -57,6 +58,7 @@ FORMAT = ArchiveFormat(
         "clip_hashes": (TEXT, ("clips",)),
         "clip_stops": ("<i8", ("clips",)),
         "credits": (TEXT, ("credits",)),
+        "world": (TEXT, ()),
         "offsets": ("<i8", ("rows",)),
         "targets": ("<i4", ("ways",)),
         "distances": ("<f4", ("ways",)),
@@ -139,6 +141,7 @@ def _arrays(graph: MotionGraph) -> Arrays:
         "clip_hashes": text_array([clip.identity for clip in database.clips]),
         "clip_stops": np.array([clip.stop for clip in database.clips], dtype="<i8"),
         "credits": text_array(list(database.credits)),
+        "world": text_array(database.world),
         "offsets": graph.offsets.astype("<i8"),
         "targets": graph.targets.astype("<i4"),
         "distances": graph.distances.astype("<f4"),
@@ -192,6 +195,7 @@ def _graph(arrays: Arrays) -> MotionGraph:
         tuple(clips),
         arrays["character"].item(),
         tuple(arrays["credits"].tolist()),
+        arrays["world"].item(),
     )
     offsets, targets, distances = (arrays[x] for x in ("offsets", "targets", "distances"))
     if len(offsets) != frames + 1 or offsets[0] != 0 or offsets[-1] != len(targets):

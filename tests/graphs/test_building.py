@@ -51,7 +51,7 @@ def test_progress_is_told(folder: Path, character: Character) -> None:
     build_graph(
         plan("walks/*.npz"), [folder], folder, character, lambda stage, _, __: told.append(stage)
     )
-    assert told == ["loading motions"] * 4 + ["comparing frames"]
+    assert told == ["loading motions"] * 4 + ["finding contacts", "comparing frames"]
 
 
 @pytest.mark.parametrize("name", ["walks/none.npz", "none/*.bvh"])
