@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from dynresp.cli.progress import progress
 from dynresp.cli.run import check_folder
 
 if TYPE_CHECKING:
+    from dynresp.graphs.choosing import Pick
     from dynresp.graphs.outing import Outing
     from dynresp.locomotion.graph import MotionGraph
 
@@ -30,15 +32,24 @@ def walk(
     seconds: Annotated[
         float, typer.Option("--seconds", min=1.0, max=3600.0, help="How long it walks.")
     ] = 20.0,
+    choose: Annotated[
+        bool, typer.Option("--choose", help="Ask every few seconds what to do next.")
+    ] = False,
+    choices: Annotated[
+        str | None,
+        typer.Option(
+            "--choices", metavar="N,N,...", help="The same with the answers given: 1,3,0 and so on."
+        ),
+    ] = None,
     seed: Seed = None,
     fps: Fps = USUAL_FPS,
     video: Video = True,
     as_json: Json = False,
 ) -> None:
-    """Walk by the graph's probabilities.
+    """Walk by the graph's probabilities, or by choice.
 
     Writes result.json, motion.npz, motion.bvh, recording.html, filmstrip.png, plan.png and, where
-    the machine can render, video.mp4.
+    the machine can render, video.mp4; by choice also options.png, the actions offered last.
     """
     import numpy as np
 
@@ -48,8 +59,18 @@ def walk(
     from dynresp.locomotion.walk import random_walk
     from dynresp.motion.character import default_character
 
+    answers = None if choices is None else read_answers(choices)
     loaded = load_graph(graph)
     check_folder(out)
+    if choose or answers is not None:
+        from dynresp.graphs.choosing import choice_outing
+
+        typer.echo("looking for clusters ...", err=True)
+        chosen = choice_outing(
+            loaded, default_character(), seconds, seed or 0, picker(answers), fps
+        )
+        finish(out, loaded, chosen, video, as_json)
+        return
     frames = max(2, round(seconds * loaded.config.fps) + 1)
     path = random_walk(loaded, frames, np.random.default_rng(seed or 0))
     composition = compose(loaded, default_character(), path, fps=fps)
@@ -61,6 +82,64 @@ def walk(
         about={"seed": seed or 0},
     )
     finish(out, loaded, outing, video, as_json)
+
+
+def read_answers(text: str) -> list[int]:
+    """Numbers of actions, from "1,3,0".
+
+    Raises:
+        UsageError: It is no such list.
+    """
+    from dynresp.errors import UsageError
+
+    try:
+        answers = [int(word) for word in text.split(",")]
+    except ValueError:
+        answers = [-1]
+    if min(answers) < 0:
+        raise UsageError(
+            f"--choices: expected whole numbers with commas between, such as 1,3,0 (0 leaves it "
+            f"to chance), got {text[:60]!r}"
+        )
+    return answers
+
+
+def picker(answers: list[int] | None) -> Pick:
+    """Who chooses: the answers one after the other, else somebody at the terminal.
+
+    Args:
+        answers: 0 leaves it to chance; where they end, the walk does.
+    """
+    from dynresp.errors import UsageError
+    from dynresp.graphs.choosing import Enough
+
+    left = None if answers is None else list(answers)
+
+    def pick(at_s: float, words: Sequence[str]) -> int | None:
+        typer.echo(f"{at_s:.1f} s", err=True)
+        for number, what in enumerate(words, 1):
+            typer.echo(f"  {number}  {what}", err=True)
+        if left is not None:
+            if not left:
+                raise Enough
+            answer = left.pop(0)
+            if answer > len(words):
+                raise UsageError(
+                    f"--choices: {answer} at {at_s:.1f} s, where {len(words)} actions are offered"
+                )
+            return answer - 1 if answer else None
+        while True:
+            try:
+                typed = typer.prompt("which (0: chance, q: enough)", default="0", err=True)
+            except typer.Abort:
+                raise Enough from None
+            if typed.strip().lower() == "q":
+                raise Enough
+            if typed.strip().isdigit() and int(typed) <= len(words):
+                return int(typed) - 1 if int(typed) else None
+            typer.echo(f"expected a number from 0 to {len(words)}, or q", err=True)
+
+    return pick
 
 
 def finish(out: Path, graph: MotionGraph, outing: Outing, video: bool, as_json: bool) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from dynresp.experiments.folder import RESULT, WRITTEN, clear_response
 from dynresp.experiments.result import versions, write_json
 from dynresp.experiments.story_files import Progress, Writer, story_writers, write_files
+from dynresp.graphs.worlds import standing_about
 from dynresp.locomotion.composing import Composition
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.locomotion.graph_file import graph_identity
@@ -78,9 +79,11 @@ def write_outing(
         DynrespError: `result.json` cannot be written.
     """
     composition = outing.composition
+    standing, bars = standing_about(graph.database.world, len(composition.motion))
     story = Story(
         motion=composition.motion,
-        blocks=outing.blocks,
+        blocks=[*outing.blocks, *standing],
+        capsules=bars,
         paths=outing.paths,
         title=outing.title,
         subtitle=outing.subtitle,
