@@ -129,6 +129,6 @@ def one_point(text: str, where: str) -> tuple[float, float]:
         x, y = (float(word) for word in words)
     except ValueError:
         raise UsageError(f"{where}: expected x,y in metres, got {text.strip()[:60]!r}") from None
-    if not max(abs(x), abs(y)) <= _FARTHEST:
+    if not (abs(x) <= _FARTHEST and abs(y) <= _FARTHEST):
         raise UsageError(f"{where}: points must be within {_FARTHEST:g} m, got {text.strip()!r}")
     return x, y

@@ -138,7 +138,8 @@ class _Scene:
                 f"/path/{i}_{path.name}",
                 np.stack([points[:-1], points[1:]], axis=1).astype(np.float32),
                 colors=_bytes(shapes.PATH_COLOR),
-                line_width=3.0,
+                thickness=3.0,
+                thickness_units="screen",
             )
         self._label = self.scene.add_label(
             "/phase", " ", anchor="bottom-center", font_size_mode="screen", font_screen_scale=1.1

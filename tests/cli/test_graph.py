@@ -1,0 +1,191 @@
+"""Motion graphs through the command line, on built-in motion."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dynresp.motion.readers.npz import read_npz
+
+from .conftest import Command
+
+PNG = b"\x89PNG\r\n\x1a\n"
+FILES = {"motion.npz", "motion.bvh", "recording.html", "filmstrip.png", "plan.png"}
+
+
+@pytest.fixture(scope="module")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from typer.testing import CliRunner
+
+    from dynresp.cli.app import app
+
+    path = tmp_path_factory.mktemp("graph") / "builtin.npz"
+    result = CliRunner().invoke(app, ["graph", "build", "builtin", "--out", str(path)])
+    assert result.exit_code == 0, result.output
+    return path
+
+
+class TestBuild:
+    def test_without_motion_capture(self, dynresp: Command, tmp_path: Path) -> None:
+        result = dynresp("graph", "build", "--out", tmp_path / "graph.npz", "--json")
+        assert result.exit_code == 0, result.stderr
+        assert "building the graph of built-in motion" in result.stderr
+        content = json.loads(result.stdout)
+        assert content["built_in_clips"] == content["clips"] > 0
+        left = content["jumps_left"]
+        assert left["pairs"] > left["contact"] >= left["likelihood"] >= left["component"] > 0
+
+    def test_the_same_graph_has_the_same_bytes(
+        self, dynresp: Command, graph: Path, tmp_path: Path
+    ) -> None:
+        again = tmp_path / "again.npz"
+        assert dynresp("graph", "build", "builtin", "--out", again).exit_code == 0
+        assert again.read_bytes() == graph.read_bytes()
+
+    def test_an_unknown_plan(self, dynresp: Command, tmp_path: Path) -> None:
+        result = dynresp("graph", "build", "biltin", "--out", tmp_path / "graph.npz")
+        assert result.exit_code == 2
+        assert "Did you mean 'builtin'?" in result.stderr
+
+    def test_motions_that_are_missing(self, dynresp: Command, tmp_path: Path) -> None:
+        result = dynresp("graph", "build", "walking", "--out", tmp_path / "graph.npz")
+        assert result.exit_code == 1
+        assert "not on this machine" in result.stderr
+        assert not (tmp_path / "graph.npz").exists()
+
+    @pytest.mark.mocap
+    def test_a_plan_of_the_users_own(
+        self, dynresp: Command, tmp_path: Path, motions_folder: Path
+    ) -> None:
+        plan = tmp_path / "plan.toml"
+        plan.write_text(
+            '[graph]\nname = "mine"\nfps = 30\n\n[[motion]]\n'
+            'motion = "snumrl_DataDrivenBipedController/*stright.bvh"\ntrim_t_pose = true\n'
+        )
+        out = tmp_path / "graph.npz"
+        result = dynresp("graph", "build", plan, "--out", out, "--motions", motions_folder)
+        assert result.exit_code == 0, result.stderr
+        assert "frames at 30 fps" in result.stdout
+        assert "Movement Research Lab" in result.stdout
+
+
+class TestInfo:
+    def test_in_words(self, dynresp: Command, graph: Path) -> None:
+        result = dynresp("graph", "info", graph)
+        assert result.exit_code == 0, result.stderr
+        assert "jumps left by each pruning rule" in result.stdout
+        assert "built-in motion" in result.stdout
+
+    def test_for_programs(self, dynresp: Command, graph: Path) -> None:
+        content = json.loads(dynresp("graph", "info", graph, "--json").stdout)
+        assert content["config"]["coordinates"] == "relative"
+        assert sum(motion["frames"] for motion in content["motions"]) == content["frames"]
+
+    def test_no_graph(self, dynresp: Command, tmp_path: Path) -> None:
+        (tmp_path / "graph.npz").write_bytes(b"no graph at all, only some text")
+        for name in ("graph.npz", "none.npz"):
+            result = dynresp("graph", "info", tmp_path / name)
+            assert result.exit_code == 2
+            assert result.stderr.startswith(f"dynresp: {tmp_path / name}:")
+
+
+class TestWalk:
+    def test_by_chance(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        out = tmp_path / "out"
+        result = dynresp("graph", "walk", graph, "--out", out, "--seconds", 4, "--no-video")
+        assert result.exit_code == 0, result.stderr
+        content = json.loads((out / "result.json").read_text())
+        assert {name for name, what in content["files"].items() if what == "written"} == FILES
+        motion = read_npz(out / "motion.npz")
+        assert motion.fps == 30.0
+        assert motion.duration == pytest.approx(4.0)
+        assert content["happened"]["foot_skate_fitted_m"]["median"] < 0.01
+        for name in ("filmstrip.png", "plan.png"):
+            assert (out / name).read_bytes().startswith(PNG)
+        assert "made of built-in motion" in result.stdout
+
+    def test_same_seed_same_bytes(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        words = ("graph", "walk", graph, "--seconds", 2, "--seed", 5, "--no-video", "--out")
+        for name in ("a", "b"):
+            assert dynresp(*words, tmp_path / name).exit_code == 0
+        for name in ("motion.npz", "motion.bvh", "result.json"):
+            assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+    def test_by_choice(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        out = tmp_path / "out"
+        result = dynresp(
+            "graph", "walk", graph, "--out", out, "--choices", "2,0,1", "--no-video", "--json"
+        )  # fmt: skip
+        assert result.exit_code == 0, result.stderr
+        content = json.loads(result.stdout)
+        assert [moment["picked"] for moment in content["choices"]] == [1, None, 0]
+        assert all(len(moment["offered"]) >= 3 for moment in content["choices"])
+        assert (out / "options.png").read_bytes().startswith(PNG)
+
+    @pytest.mark.parametrize(
+        ("choices", "said"), [("1,x", "expected whole numbers"), ("9", "actions are offered")]
+    )
+    def test_wrong_choices(
+        self, dynresp: Command, graph: Path, tmp_path: Path, choices: str, said: str
+    ) -> None:
+        result = dynresp("graph", "walk", graph, "--out", tmp_path / "out", "--choices", choices)
+        assert result.exit_code == 2
+        assert said in result.stderr
+
+    def test_a_file_in_the_way(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        (tmp_path / "out").write_text("mine")
+        result = dynresp("graph", "walk", graph, "--out", tmp_path / "out")
+        assert result.exit_code == 2
+        assert (tmp_path / "out").read_text() == "mine"
+
+
+class TestSketch:
+    def test_along_a_path(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        path = tmp_path / "path.csv"
+        path.write_text("# x, y\n0, 0\n4, 0\n\n6, 3\n")
+        words = ("graph", "sketch", graph, "--no-video", "--json", "--out")
+        by_file = dynresp(*words, tmp_path / "a", "--path", path)
+        assert by_file.exit_code == 0, by_file.stderr
+        content = json.loads(by_file.stdout)
+        assert content["sketch"]["arrived"]
+        assert content["sketch"]["off_path_mean_m"] < 0.3
+        by_words = dynresp(*words, tmp_path / "b", "--points", "0,0 4,0 6,3")
+        assert json.loads(by_words.stdout) == content
+
+    def test_around_a_box(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        world = tmp_path / "world.toml"
+        world.write_text(
+            "[world]\nbounds = [-3, -4, 9, 4]\n\n[[box]]\ncenter = [3, 0]\nsize = [0.6, 1.5]\n"
+        )
+        result = dynresp(
+            "graph", "sketch", graph, "--goal", "6,0", "--world", world, "--no-video", "--json",
+            "--out", tmp_path / "out",
+        )  # fmt: skip
+        assert result.exit_code == 0, result.stderr
+        assert json.loads(result.stdout)["sketch"]["arrived"]
+
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [
+            ((), "give a path by --points or --path"),
+            (("--points", "0,0 1"), "--points: expected x,y in metres, got '1'"),
+            (("--points", "0,0"), "two corners or more"),
+            (("--points", "0,0 1,nan"), "within 10000 m"),
+            (("--path", "none.csv"), "cannot be read"),
+            (("--goal", "1,1", "--points", "0,0 1,1"), "give a path"),
+            (("--goal", "1;1"), "--goal: expected x,y"),
+            (("--maze", "--world", "none.toml"), "no such file"),
+        ],
+    )
+    def test_wrong_requests(
+        self,
+        dynresp: Command,
+        graph: Path,
+        tmp_path: Path,
+        words: tuple[str, ...],
+        said: str,
+    ) -> None:
+        result = dynresp("graph", "sketch", graph, "--out", tmp_path / "out", *words)
+        assert result.exit_code == 2, result.output
+        assert said in result.stderr
+        assert "Traceback" not in result.stderr
