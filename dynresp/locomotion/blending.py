@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dynresp.errors import MotionError
 from dynresp.locomotion.database import BoolArray, IntArray
 from dynresp.locomotion.graph import MotionGraph, between
-from dynresp.locomotion.placement import IDENTITY, of_poses
+from dynresp.locomotion.placement import IDENTITY, of_poses, place_poses
 from dynresp.motion.rotations import FloatArray
 
 
@@ -117,3 +117,26 @@ class Playback:
         )  # fmt: skip
         self.frame = int(path[-1])
         return Played(entered, poses, database.contacts[entered], jumps, placements)
+
+
+def recorded_steps(
+    graph: MotionGraph, before: int, played: Played
+) -> tuple[FloatArray, FloatArray]:
+    """The recorded poses between which each played frame was reached, placed, nothing blended.
+
+    A frame that was jumped to comes from the one recorded before it, which is laid over the frame
+    left.
+
+    Args:
+        graph: Whose frames.
+        before: The frame played before the first.
+        played: What was played.
+
+    Returns:
+        (k, 59) where each step begins, and (k, 59) where it ends.
+    """
+    poses, entered = graph.database.poses, played.frames
+    left = np.concatenate([[before], entered[:-1]])
+    left = np.where(played.jumps, entered - 1, left)
+    starts = place_poses(poses[left], played.placements)
+    return starts, place_poses(poses[entered], played.placements)

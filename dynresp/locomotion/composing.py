@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion import placement
-from dynresp.locomotion.blending import Playback
+from dynresp.locomotion.blending import Playback, recorded_steps
 from dynresp.locomotion.database import BoolArray, IntArray
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.locomotion.placement import IDENTITY
@@ -63,10 +63,7 @@ def compose(
     start = np.array(place, dtype=np.float64)
     played = playback.play(path[1:])
     database = graph.database
-    # A jump to a frame comes from the one recorded before it, laid over the frame left.
-    left = np.where(played.jumps, path[1:] - 1, path[:-1])
-    starts = placement.place_poses(database.poses[left], played.placements)
-    ends = placement.place_poses(database.poses[path[1:]], played.placements)
+    starts, ends = recorded_steps(graph, int(path[0]), played)
     first = placement.place_poses(database.poses[path[:1]], start)
     knots = np.concatenate([first, played.poses])
     step, part = at_rate(len(path), graph.config.fps, fps)

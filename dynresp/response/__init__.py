@@ -10,7 +10,7 @@
 `oracle_choice`, `classifier_choice`   who chooses; `budget` says which, `choice` is what comes out
 `transition`, `finish`                 servo targets and blend, and the motion after the exit
 `respond`, `response`                  hits answered in bulk
-`crowd`, `dynamic`                     characters at run time, frame by frame
+`crowd`, `dynamic`, `plan`             characters at run time, frame by frame
 `labelling`                            hits as a classifier learns from them
 `quality`, `surface`                   how good a response is, and the landscape of its alignment
 =====================================  ===========================================================

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from dynresp.motion.character import Character
+from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
 from dynresp.response.look_ahead import LookAhead
+from dynresp.response.response import ResponseConfig
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,17 @@ class Choice:
 
 
 class Chooser(Protocol):
-    """What decides how hits go on."""
+    """What decides how hits go on.
+
+    Attributes:
+        character: Whom it chooses for.
+        library: What it chooses from.
+        config: Settings; those of whoever simulates the hits are the same.
+    """
+
+    character: Character
+    library: ReactionLibrary
+    config: ResponseConfig
 
     def choose(self, hits: LookAhead) -> list[Choice]:
         """Choose for each hit."""

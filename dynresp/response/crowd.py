@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from dynresp.errors import MotionError
+from dynresp.errors import MotionError, UsageError
 from dynresp.motion.character import Character
 from dynresp.motion.floor import raise_above
 from dynresp.motion.library import ReactionLibrary
@@ -53,13 +52,15 @@ class Crowd:
             library: Its reactions, at the simulation's frame rate.
             bases: What each plays, at that rate.
             config: Settings.
-            chooser: What chooses; None for the oracle.
+            chooser: What chooses, made for the same character and library with the same settings;
+                None for the oracle.
             threads: Threads for the physics, 0 for all cores.
             stage: Where scenes are kept, for several crowds of one body and the same settings,
                 with its own number of threads; None for one of its own.
 
         Raises:
             MotionError: There is no base motion, or a motion has another frame rate.
+            UsageError: The chooser was made for something else.
         """
         if not bases:
             raise MotionError("a crowd needs at least one base motion; none was given")
@@ -71,6 +72,8 @@ class Crowd:
                     f"motion {motion.name!r} has {motion.fps:g} fps, but the simulation runs at "
                     f"{fps:g}; resample it"
                 )
+        if chooser is not None:
+            _check_chooser(chooser, character, library, self.config)
         self.responders = tuple(
             DynamicResponder(base, character, self.config.physics) for base in bases
         )
@@ -78,8 +81,6 @@ class Crowd:
         self._chooser = chooser or OracleChooser(character, library, self.config)
         self._stage = stage or HitStage(character, self.config, threads)
         self._simulations: dict[ImpactorKind, Simulation] = {}
-        # A base motion that is carried on goes on to its end.
-        self._endless = replace(self.config, carry_on_s=1e6)
 
     def advance(self) -> FloatArray:
         """Go on by one frame.
@@ -120,6 +121,9 @@ class Crowd:
 
     def _approach(self, simulation: Simulation, ids: list[int]) -> None:
         """One frame towards contact, and what follows from it."""
+        for i in ids:
+            # What it plays may have been changed.
+            simulation.setups[i] = self._flight(i).setup
         simulation.approach(ids)
         hit = []
         for i in ids:
@@ -189,9 +193,9 @@ class Crowd:
             return
         out = flight.exit - flight.launch
         simulated = final.poses[out : out + transition.blend_frames(self.config.physics.fps) + 1]
-        end = ending(self._character, self._endless, simulated, choice)
-        responder.plan(end.poses, flight.exit)
-        responder.phase = Phase.BLEND
+        end = ending(self._character, self.config, simulated, choice)
+        flight.end = flight.exit + transition.blend_frames(self.config.physics.fps)
+        responder.enter(choice, simulated[0], end.poses)
         responder.tell(EventKind.BLEND_BEGUN, flight.exit)
 
     def _give_up(self, i: int, why: EventKind, simulation: Simulation | None = None) -> None:
@@ -205,23 +209,21 @@ class Crowd:
         responder, flight = self.responders[i], self._flight(i)
         length = self.config.transition.blend_frames(self.config.physics.fps)
         responder.tell(why)
-        now = responder.frame - flight.launch
-        base = flight.base.poses[now:]
         start = responder.pose
         simulated = np.repeat(start[None], length + 1, axis=0)
         if simulation is not None:
             first = simulation.frame(i) - 1
-            trace = simulation.follow([i], [first], [flight.base.poses[first:]], length)[0]
+            targets = responder.planned(responder.frame, length + simulation.read_ahead)
+            trace = simulation.follow([i], [first], [targets], length)[0]
             if trace.diverged is None:
                 simulated = trace.poses[first : first + length + 1]
-        # One that was held is where the base motion is; another is met where it stands.
+        # One that was held is where its plan is; another is met where it stands.
+        base = responder.planned(responder.frame, length + 1)
         placed = base if flight.setup.held else place_on(base, 0, start)
-        blend = blend_onto(simulated, placed[: length + 1])
-        fps = self.config.physics.fps
-        blend = raise_above(self._character, blend, fps)
-        responder.plan(np.concatenate([blend, placed[length + 1 :]]), responder.frame)
-        flight.exit = responder.frame
-        responder.phase = Phase.BLEND
+        blend = blend_onto(simulated, placed)
+        blend = raise_above(self._character, blend, self.config.physics.fps)
+        flight.exit, flight.end = responder.frame, responder.frame + length
+        responder.go_back(None if flight.setup.held else start, blend)
 
     def _show(self, i: int, responder: DynamicResponder) -> None:
         """The next frame of one character."""
@@ -237,8 +239,7 @@ class Crowd:
             responder.show(flight.trace.poses[following - flight.launch])
         else:
             responder.show(responder.planned(following, 1)[0])
-        length = self.config.transition.blend_frames(self.config.physics.fps)
-        if responder.phase is Phase.BLEND and flight and following >= flight.exit + length:
+        if responder.phase is Phase.BLEND and flight and following >= flight.end:
             responder.phase = Phase.PLAYING
             responder.tell(EventKind.BLEND_ENDED)
 
@@ -246,3 +247,19 @@ class Crowd:
         flight = self.responders[i].flight
         assert flight is not None
         return flight
+
+
+def _check_chooser(
+    chooser: Chooser, character: Character, library: ReactionLibrary, config: ResponseConfig
+) -> None:
+    """Refuse a chooser that was made for something else, before a hit finds it out."""
+    for what, same in (
+        ("character", chooser.character.identity == character.identity),
+        ("library", chooser.library.identity == library.identity),
+        ("config", chooser.config == config),
+    ):
+        if not same:
+            raise UsageError(
+                f"the chooser was made with another {what} than the crowd's; make it with the "
+                "character, the library and the config that the crowd is given"
+            )

@@ -1,12 +1,13 @@
 """Characters at run time: events in their order, one continuous motion, second hits, misses."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionError, SpecError
+from dynresp.errors import MotionError, SpecError, UsageError
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.library import ReactionLibrary
@@ -14,10 +15,12 @@ from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
 from dynresp.physics.simulation import Simulation
 from dynresp.response.dynamic import DynamicResponder, EventKind, Phase
+from dynresp.response.oracle_choice import OracleChooser
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.transition import TransitionConfig
+from dynresp.response.window_config import WindowErrorConfig
 from tests.physics.samples import punching, walking
-from tests.response.samples import FLUFF, HITS, WatchedCrowd
+from tests.response.samples import FLUFF, HITS, WatchedCrowd, tiny_library
 
 HARD = Ball(1.0, speed=12.0, mass=8.0)
 
@@ -246,6 +249,20 @@ def test_what_cannot_come_is_refused(
         _crowd(character, library)
     with pytest.raises(MotionError, match="has 60 fps"):
         _crowd(character, library, walking(character, 1.0, fps=60.0))
+
+
+def test_a_chooser_made_with_other_settings_is_refused(
+    character: Character, library: ReactionLibrary, base: Motion
+) -> None:
+    config = ResponseConfig(window=WindowErrorConfig(fps=30.0, exit_max_s=0.9))
+    chooser = OracleChooser(character, library, config)
+    with pytest.raises(UsageError, match="made with another config"):
+        WatchedCrowd(character, library, [base], chooser=chooser)
+    other = tiny_library(backing=walking(character, 1.5, speed=-1.0))
+    other = replace(other, identity="other")
+    with pytest.raises(UsageError, match="made with another library"):
+        WatchedCrowd(character, other, [base], config, chooser)
+    WatchedCrowd(character, library, [base], config, chooser)
 
 
 def test_a_second_hit_begins_where_the_first_has_come_to(

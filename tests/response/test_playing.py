@@ -1,0 +1,185 @@
+"""What a character plays is changed while it runs: piece by piece, during a hit, after one."""
+
+import time
+
+import numpy as np
+import pytest
+
+from dynresp.errors import MotionError, SpecError
+from dynresp.motion.character import ROOT, Character
+from dynresp.motion.library import ReactionLibrary
+from dynresp.motion.motion import Motion
+from dynresp.physics.impacts import Ball
+from dynresp.response.dynamic import EventKind, Phase
+from tests.physics.samples import walking
+from tests.response.samples import FLUFF, WatchedCrowd
+
+HARD = Ball(1.0, speed=12.0, mass=8.0)
+MISS = Ball(0.5, speed=8.0, offset=4.0)
+
+
+def _crowd(character: Character, library: ReactionLibrary, *bases: Motion) -> WatchedCrowd:
+    return WatchedCrowd(character, library, bases, threads=1)
+
+
+def _until(crowd: WatchedCrowd, phase: Phase) -> None:
+    for _ in range(200):
+        if crowd.responders[0].phase is phase:
+            return
+        crowd.advance()
+    raise AssertionError(f"never {phase}")
+
+
+def _steps(motion: Motion) -> float:
+    """The farthest that the root goes between two frames [m]."""
+    return float(np.linalg.norm(np.diff(motion.poses[:, ROOT], axis=0), axis=1).max())
+
+
+@pytest.mark.parametrize("hit", [HARD, MISS, Ball(1.0, **FLUFF)])
+def test_a_motion_given_piece_by_piece_is_played_as_a_whole(
+    character: Character, library: ReactionLibrary, hit: Ball
+) -> None:
+    whole = walking(character, 20.0, yaw=0.4)
+    crowds = [_crowd(character, library, whole), _crowd(character, library, whole.slice(0, 5))]
+    ahead, piece = 150, 10
+    for crowd in crowds:
+        crowd.responders[0].hit(hit)
+    fed = 5
+    for frame in range(120):
+        responder = crowds[1].responders[0]
+        # What comes after a choice is another matter.
+        while fed < frame + ahead and not any(event.choice for event in responder.events):
+            responder.play(whole.slice(fed, fed + piece), responder.planned_until)
+            fed += piece
+        for crowd in crowds:
+            crowd.advance()
+    a, b = (crowd.shown().poses for crowd in crowds)
+    np.testing.assert_allclose(a[:31], b[:31], atol=1e-9)
+    first, second = (crowd.responders[0] for crowd in crowds)
+    assert [event.kind for event in first.events] == [event.kind for event in second.events]
+    names = [[e.choice.name for e in r.events if e.choice] for r in (first, second)]
+    assert names[0] == names[1]
+    np.testing.assert_allclose(a[-1], b[-1], atol=1e-3)
+
+
+def test_memory_and_the_cost_of_a_hit_do_not_grow_with_what_was_played(
+    character: Character, library: ReactionLibrary
+) -> None:
+    whole = walking(character, 60.0)
+    crowd = _crowd(character, library, whole.slice(0, 200))
+    (responder,) = crowd.responders
+    seconds = []
+    for lap in range(30):
+        piece = whole.slice(200 + 40 * lap, 240 + 40 * lap)
+        responder.play(piece, responder.planned_until)
+        for _ in range(40):
+            crowd.advance()
+        begin = time.perf_counter()
+        responder.hit(Ball(0.3, speed=10.0, offset=4.0))
+        seconds.append(time.perf_counter() - begin)
+        _until(crowd, Phase.APPROACH)
+        assert responder.flight is not None
+        assert len(responder.flight.base) < 200
+        assert len(responder._plan.stretches) < 10
+    assert np.median(seconds[-10:]) < 3.0 * np.median(seconds[5:15])
+
+
+def test_a_hit_costs_the_same_however_long_the_base_motion_is(
+    character: Character, library: ReactionLibrary
+) -> None:
+    seconds = []
+    for length in (20.0, 1200.0):
+        (responder,) = _crowd(character, library, walking(character, length)).responders
+        took = []
+        for k in range(20):
+            begin = time.perf_counter()
+            responder.hit(Ball(1.0 + k))
+            took.append(time.perf_counter() - begin)
+        seconds.append(np.median(took))
+    assert seconds[1] < 3.0 * seconds[0]
+
+
+def test_what_is_asked_for_during_the_approach_is_played_after_a_miss(
+    character: Character, library: ReactionLibrary
+) -> None:
+    base = walking(character, 6.0)
+    crowd = _crowd(character, library, base)
+    (responder,) = crowd.responders
+    responder.hit(MISS)
+    _until(crowd, Phase.APPROACH)
+    first = responder.frame + 3
+    turned = walking(character, 6.0, yaw=0.3)
+    turned = turned.moved(0.0, base.poses[first, ROOT] - turned.poses[first, ROOT])
+    responder.play(turned.slice(first, len(turned)), first)
+    assert responder.flight is not None
+    np.testing.assert_allclose(responder.flight.base.poses[4], turned.poses[first], atol=1e-12)
+    for _ in range(40):
+        crowd.advance()
+    assert EventKind.MISSED in [event.kind for event in responder.events]
+    np.testing.assert_allclose(responder.pose, turned.poses[responder.frame], atol=1e-12)
+    assert _steps(crowd.shown()) < 0.1
+
+
+def test_a_hit_that_is_carried_on_through_goes_on_with_what_was_asked_for_meanwhile(
+    character: Character, library: ReactionLibrary
+) -> None:
+    base = walking(character, 12.0)
+    crowd = _crowd(character, library, base.slice(0, 90))
+    (responder,) = crowd.responders
+    responder.hit(Ball(1.0, **FLUFF))
+    _until(crowd, Phase.APPROACH)
+    responder.play(base.slice(90, 300), 90)
+    for _ in range(200):
+        crowd.advance()
+    assert [e.choice.name for e in responder.events if e.choice] == ["carry_on"]
+    # It walks on, past what it had at first, from where the hit has left it.
+    assert crowd.shown().poses[-1, 0] - crowd.shown().poses[100, 0] > 3.0
+    assert _steps(crowd.shown()) < 0.1
+
+
+def test_after_a_reaction_it_walks_on(character: Character, library: ReactionLibrary) -> None:
+    crowd = _crowd(character, library, walking(character, 4.0))
+    (responder,) = crowd.responders
+    responder.hit(HARD)
+    _until(crowd, Phase.PHYSICS)
+    assert responder.free_from is None
+    with pytest.raises(SpecError, match="before its blend has begun"):
+        responder.play(walking(character, 1.0))
+    _until(crowd, Phase.BLEND)
+    free = responder.free_from
+    assert free == responder.frame + 10
+    with pytest.raises(SpecError, match=f"free from frame {free} on, got {free - 1}"):
+        responder.play(walking(character, 1.0), free - 1)
+    pose = responder.planned(free, 1)[0]
+    on = walking(character, 3.0)
+    on = on.placed(*pose[:2])
+    responder.play(on)
+    assert responder.planned_until == free + len(on)
+    while responder.frame < free + 20:
+        crowd.advance()
+    np.testing.assert_allclose(responder.pose, on.poses[20], atol=1e-12)
+
+
+def test_a_motion_of_another_rate_or_of_the_past_is_refused(
+    character: Character, library: ReactionLibrary
+) -> None:
+    (responder,) = _crowd(character, library, walking(character, 2.0)).responders
+    with pytest.raises(MotionError, match="has 60 fps"):
+        responder.play(walking(character, 1.0, fps=60.0))
+    with pytest.raises(SpecError, match="free from frame 1 on, got 0"):
+        responder.play(walking(character, 1.0), 0)
+
+
+def test_a_second_hit_before_the_blend_has_ended_goes_on_with_a_moved_plan(
+    character: Character, library: ReactionLibrary
+) -> None:
+    crowd = _crowd(character, library, walking(character, 4.0))
+    (responder,) = crowd.responders
+    responder.hit(HARD)
+    _until(crowd, Phase.BLEND)
+    responder.hit(Ball(0.25, speed=10.0, offset=4.0))
+    for _ in range(40):
+        crowd.advance()
+    assert EventKind.MISSED in [event.kind for event in responder.events]
+    assert responder.phase is Phase.PLAYING
+    assert _steps(crowd.shown()) < 0.2
