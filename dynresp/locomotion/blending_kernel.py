@@ -79,13 +79,19 @@ def _move(place, dx, dy, dz, turn):  # type: ignore[no-untyped-def]
 
 @njit
 def _decay(offset, rate, age, blend_s, rate_s):  # type: ignore[no-untyped-def]
-    """Bring a displacement and its rate to what they are at an age: cubics that end at rest."""
-    s, u = min(age / blend_s, 1.0), min(age / rate_s, 1.0)
+    """Bring a displacement and its rate to what they are at an age: cubics that end at rest.
+
+    The root takes twice as long as joints to change its speed: with as short a time it would jerk,
+    while joints would swing too far with a longer one.
+    """
+    s = min(age / blend_s, 1.0)
     from_offset = (2.0 * s - 3.0) * s * s + 1.0
     slope_of_offset = 6.0 * (s - 1.0) * s / blend_s
-    from_rate = ((u - 2.0) * u + 1.0) * u * rate_s
-    slope_of_rate = (3.0 * u - 4.0) * u + 1.0
     for i in range(45):
+        lasts = min(2.0 * rate_s, blend_s) if i < 6 else rate_s
+        u = min(age / lasts, 1.0)
+        from_rate = ((u - 2.0) * u + 1.0) * u * lasts
+        slope_of_rate = (3.0 * u - 4.0) * u + 1.0
         o, r = offset[i], rate[i]
         offset[i] = from_offset * o + from_rate * r
         rate[i] = slope_of_offset * o + slope_of_rate * r
@@ -161,7 +167,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
         moves: (k, 4) where the clip of each is put, seen from the clip before; read at jumps.
         fps: Frame rate.
         blend_s: Time over which a displacement decays [s].
-        rate_s: Time over which its rate does, at most as long.
+        rate_s: Time over which the rate of joints does, at most as long; the root's takes twice it.
         place: In and out, (4,) where the clip is put.
         offset: In and out, (45,) displacement at the last jump; see `displacement_kernel`.
         rate: In and out, (45,) its rate of change then.

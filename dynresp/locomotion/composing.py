@@ -17,6 +17,9 @@ from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
 from dynresp.motion.motion import Motion, interpolate
 from dynresp.motion.rotations import FloatArray
 
+# A frame so near to a knot is on it, as part of the way between two.
+_ON = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Composition:
@@ -69,7 +72,7 @@ def compose(
     step, part = at_rate(len(path), graph.config.fps, fps)
     poses = interpolate(knots[step], knots[step + 1], part)
     source = interpolate(starts[step], ends[step], part)
-    contacts: BoolArray = database.contacts[path[step + (part >= 0.5)], :2]
+    contacts = standing(database.contacts[path, :2], step, part)
     jumps = np.flatnonzero(played.jumps) + 1
     # The first frame of the motion after the frame left.
     entered = np.unique(np.searchsorted(step, jumps - 1))
@@ -84,6 +87,25 @@ def compose(
         placements=np.concatenate([start[None], played.placements]),
         sliding=poses,
     )
+
+
+def standing(contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray) -> BoolArray:
+    """Which feet stand in frames among knots: between two knots those that stand at both.
+
+    A foot that comes down, or is lifted, moves fast until the knot at which it stands, or from it
+    on; were it held before, it would be held in the wrong place.
+
+    Args:
+        contacts: (k, 2) at the knots.
+        step: (n,) see `at_rate`.
+        part: (n,) see `at_rate`.
+
+    Returns:
+        (n, 2).
+    """
+    before, after = contacts[step], contacts[step + 1]
+    there = part[:, None]
+    return np.where(there <= 0.0, before, after & (before | (there >= 1.0 - _ON)))
 
 
 def at_rate(count: int, rate: float, fps: float) -> tuple[npt.NDArray[np.intp], FloatArray]:

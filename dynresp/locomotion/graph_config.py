@@ -44,7 +44,7 @@ class GraphConfig:
         blend_rate_s: Time over which the difference in velocity at a jump goes, at most blend_s
             [s]. The paper has one time for both; but a joint that is 3 rad/s faster when it is
             left would go on to swing 25 degrees too far in a blend of 1 s, and a third of it in
-            0.3 s.
+            0.3 s. The root takes twice this time.
         block_m: Side of a block [m], of `Coordinates.BLOCKS`.
         block_height_m: Its height [m].
     """

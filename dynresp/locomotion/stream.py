@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from dynresp.locomotion import placement
 from dynresp.locomotion.blending import Playback, recorded_steps
+from dynresp.locomotion.composing import standing
 from dynresp.locomotion.database import BoolArray
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.motion.character import Character
@@ -100,7 +101,7 @@ class Stream:
         part = np.clip((clock - at[step]) / ratio, 0.0, 1.0)
         self._poses = np.concatenate([self._poses, interpolate(knots[step], knots[step + 1], part)])
         self._source = np.concatenate([self._source, interpolate(starts[step], ends[step], part)])
-        self._contacts = np.concatenate([self._contacts, touching[step + (part >= 0.5)]])
+        self._contacts = np.concatenate([self._contacts, standing(touching, step, part)])
         jumped = clock[np.searchsorted(step, np.flatnonzero(played.jumps)).clip(0, len(clock) - 1)]
         self._jumps += [int(frame) for frame in np.unique(jumped) if frame > self._jumps[-1]]
         due = np.round(at[1:]).astype(int)

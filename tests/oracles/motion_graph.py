@@ -1,4 +1,4 @@
-"""The lower layer of the motion graph, slow and readable: distances and pruning, pair by pair.
+"""The lower layer of the motion graph, slow and readable: distances, pruning, ways; pair by pair.
 
 Nothing is shared with the product but quaternion arithmetic. Frames are really laid over each
 other, every quarter turn is built, and matrices are dense.
@@ -10,8 +10,11 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
+from dynresp.locomotion.database import MotionDatabase
 from dynresp.locomotion.graph_config import Coordinates, GraphConfig
 from dynresp.motion import rotations
+from dynresp.motion.character import Character
+from dynresp.motion.motion import FEET
 
 Vector = npt.NDArray[np.float64]
 Matrix = npt.NDArray[np.float64]
@@ -141,3 +144,69 @@ def transitions(
     else:
         best = jumps()
     return [(i, j + 1) for i, j in best], counts
+
+
+def keeps_its_feet(
+    database: MotionDatabase, source: int, target: int, config: GraphConfig, character: Character
+) -> bool:
+    """Whether no foot that stands through a whole blend would have to slip too far for it."""
+    blend = range(target, target + max(1, round(config.blend_s * config.fps)))
+    (clip,) = (clip for clip in database.clips if clip.start <= target < clip.stop)
+    matched, left = target - 1, database.poses[source]
+    laid, _ = laid_over(database.poses[matched], database.velocities[matched], left, config)
+    places = character.kinematics(np.stack([left, laid])).positions
+    for column, side in enumerate(FEET):
+        stands = all(k < clip.stop and database.contacts[k, column] for k in blend)
+        before, after = places[:, character.body(f"{side}_foot"), :2]
+        if stands and np.linalg.norm(after - before) > config.slip_m:
+            return False
+    return True
+
+
+def reachable(start: int, ways: dict[int, set[int]]) -> set[int]:
+    """Frames to which some way leads from a frame, over one step or more."""
+    found: set[int] = set()
+    left = [start]
+    while left:
+        for frame in ways[left.pop()] - found:
+            found.add(frame)
+            left.append(frame)
+    return found
+
+
+def largest_component(frames: int, ways: list[tuple[int, int]]) -> set[int]:
+    """Frames of the largest strongly connected component; empty where no way leads back.
+
+    Two frames belong together where each can be reached from the other. Of components of one size
+    it is the one with the earliest frame.
+    """
+    following: dict[int, set[int]] = {frame: set() for frame in range(frames)}
+    for source, target in ways:
+        following[source].add(target)
+    reached = {frame: reachable(frame, following) for frame in range(frames)}
+    components = [{j for j in reached[i] if i in reached[j]} for i in range(frames)]
+    return max(components, key=lambda component: (len(component), -min(component, default=0)))
+
+
+def graph(
+    database: MotionDatabase, jumps: list[tuple[int, int, float]], config: GraphConfig
+) -> dict[int, dict[int, float]]:
+    """For each frame of the component the probabilities of the ways from it (eq. 1).
+
+    Args:
+        database: The frames.
+        jumps: Source, target and distance of the jumps that three rules have left.
+        config: Says sigma.
+    """
+    distances = {(source, target): distance for source, target, distance in jumps}
+    for clip in database.clips:
+        distances |= {(frame, frame + 1): 0.0 for frame in range(clip.start, clip.stop - 1)}
+    inside = largest_component(len(database), list(distances))
+    rows: dict[int, dict[int, float]] = {frame: {} for frame in sorted(inside)}
+    for (source, target), distance in distances.items():
+        if source in inside and target in inside:
+            rows[source][target] = math.exp(-distance / config.sigma)
+    return {
+        frame: {target: weight / sum(row.values()) for target, weight in row.items()}
+        for frame, row in rows.items()
+    }

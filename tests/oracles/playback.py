@@ -56,9 +56,12 @@ def decayed(
     offset: FloatArray, rate: FloatArray, age: float, config: GraphConfig
 ) -> tuple[FloatArray, FloatArray]:
     """What is left of a displacement and its rate: a cubic each, at rest in the end."""
-    left, its_rate = cubic(offset, np.zeros(45), age, config.blend_s)
-    more, its_slope = cubic(np.zeros(45), rate, age, config.blend_rate_s)
-    return left + more, its_rate + its_slope
+    of_root = np.where(np.arange(45) < 6, rate, 0.0)
+    slower = min(2.0 * config.blend_rate_s, config.blend_s)
+    left, its_slope = cubic(offset, np.zeros(45), age, config.blend_s)
+    root, its_rate = cubic(np.zeros(45), of_root, age, slower)
+    joints, their_rate = cubic(np.zeros(45), rate - of_root, age, config.blend_rate_s)
+    return left + root + joints, its_slope + its_rate + their_rate
 
 
 def cubic(

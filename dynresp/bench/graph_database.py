@@ -1,0 +1,100 @@
+"""Databases of any number of frames for benchmarks of motion graphs."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dynresp.errors import MissingMotionDataError
+from dynresp.graphs.building import build_graph
+from dynresp.graphs.plan import find_plan, read_plan
+from dynresp.locomotion.database import BoolArray, Clip, MotionDatabase
+from dynresp.motion import rotations
+from dynresp.motion.character import Character
+from dynresp.motion.rotations import FloatArray
+from dynresp.motion.sources import motion_folders
+
+PLANS = ("walking", "builtin")
+"""Whose motions are taken: of the first plan whose motions are on this machine."""
+
+# Size of deviations of clips that are taken again [rad], with which as large a part of the pairs is
+# close as in recorded walking; their number and frequencies [Hz].
+_DEVIATION, _WAVES, _FREQUENCIES = 0.07, 4, (0.1, 1.2)
+
+
+def database_of(recorded: MotionDatabase, frames: int, rng: np.random.Generator) -> MotionDatabase:
+    """A database of so many frames.
+
+    Args:
+        recorded: Whose clips are taken, in their order. When all are, they are taken again, every
+            time with other slow deviations of all rotations, as of another performance.
+        frames: How many.
+        rng: Source of the deviations.
+    """
+    poses: list[FloatArray] = []
+    contacts: list[BoolArray] = []
+    clips: list[Clip] = []
+    at = 0
+    while at < frames:
+        again = at >= len(recorded)
+        for clip in recorded.clips:
+            stop = min(clip.stop, clip.start + frames - at)
+            if stop <= clip.start:
+                break
+            own = recorded.poses[clip.start : stop]
+            poses.append(_deviating(own, recorded.fps, rng) if again else own)
+            contacts.append(recorded.contacts[clip.start : stop])
+            clips.append(Clip(clip.name, at, at + len(own), f"{clip.identity}.{len(clips)}"))
+            at += len(own)
+    return replace(
+        recorded, poses=np.concatenate(poses), contacts=np.concatenate(contacts), clips=tuple(clips)
+    )
+
+
+def _deviating(poses: FloatArray, fps: float, rng: np.random.Generator) -> FloatArray:
+    """Poses (n, 59) whose root and joints turn a little otherwise."""
+    time_s = np.arange(len(poses)) / fps
+    turns = np.zeros((len(poses), 14, 3))
+    for _ in range(_WAVES):
+        phase = 2.0 * np.pi * rng.uniform(*_FREQUENCIES) * time_s + rng.uniform(0.0, 2.0 * np.pi)
+        turns += rng.normal(0.0, _DEVIATION, (14, 3)) * np.sin(phase)[:, None, None]
+    quaternions = poses[:, 3:].reshape(-1, 14, 4)
+    turned = rotations.multiply(quaternions, rotations.from_rotation_vector(turns))
+    return np.concatenate([poses[:, :3], turned.reshape(len(poses), -1)], axis=1)
+
+
+def recorded_database(motions: Path | None, character: Character) -> tuple[str, MotionDatabase]:
+    """The frames of the first plan whose motions are on this machine.
+
+    Args:
+        motions: Motions folder.
+        character: The character.
+
+    Returns:
+        Name of the plan, and its frames.
+
+    Raises:
+        DynrespError: Motions cannot be read.
+    """
+    folders = motion_folders(motions)
+    for name in PLANS:
+        path = find_plan(name)
+        with suppress(MissingMotionDataError):
+            plan = read_plan(path)
+            graph = build_graph(plan, folders, path.parent, character, lambda *_: None)
+            return name, graph.database
+    raise MissingMotionDataError("built-in motion is missing; install dynresp again")
+
+
+def about(plan: str, frames: int, recorded: int) -> str:
+    """A sentence on what a database was made of: of which plan, and how many were recorded."""
+    source = f"the {frames:,} frames are the first of the plan {plan!r}"
+    if plan == PLANS[-1]:
+        source += ", built-in motion and no motion capture"
+    if frames > recorded:
+        source = source.replace("the first of", f"{recorded:,} of")
+        source += ", and those again with slow random deviations"
+    return source + "."
