@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dynresp.cli.graph_info import Graph
-from dynresp.cli.options import Json, Seed
+from dynresp.cli.options import Json, Motions, Seed
 from dynresp.cli.progress import progress
 from dynresp.cli.run import check_folder
 
@@ -41,18 +41,23 @@ def walk(
             "--choices", metavar="N,N,...", help="The same with the answers given: 1,3,0 and so on."
         ),
     ] = None,
+    balls: Annotated[
+        bool, typer.Option("--balls", help="Throw balls at it; it takes them and walks on.")
+    ] = False,
+    motions: Motions = None,
     seed: Seed = None,
     fps: Fps = USUAL_FPS,
     video: Video = True,
     as_json: Json = False,
 ) -> None:
-    """Walk by the graph's probabilities, or by choice.
+    """Walk by the graph's probabilities, by choice, or with balls thrown at it.
 
     Writes result.json, motion.npz, motion.bvh, recording.html, filmstrip.png, plan.png and, where
     the machine can render, video.mp4; by choice also options.png, the actions offered last.
     """
     import numpy as np
 
+    from dynresp.errors import UsageError
     from dynresp.graphs.outing import Outing
     from dynresp.locomotion.composing import compose
     from dynresp.locomotion.graph_file import load_graph
@@ -60,8 +65,19 @@ def walk(
     from dynresp.motion.character import default_character
 
     answers = None if choices is None else read_answers(choices)
+    if balls and (choose or answers is not None):
+        raise UsageError("--balls goes with a walk by chance; leave out --choose and --choices")
     loaded = load_graph(graph)
     check_folder(out)
+    if balls:
+        from dynresp.graphs.hitting import hit_outing
+        from dynresp.motion.sources import motion_folders
+
+        folders = motion_folders(motions)
+        with progress() as tell:
+            hit = hit_outing(loaded, default_character(), folders, seconds, seed or 0, tell)
+        finish(out, loaded, hit, video, as_json)
+        return
     if choose or answers is not None:
         from dynresp.graphs.choosing import choice_outing
 
@@ -74,11 +90,12 @@ def walk(
     frames = max(2, round(seconds * loaded.config.fps) + 1)
     path = random_walk(loaded, frames, np.random.default_rng(seed or 0))
     composition = compose(loaded, default_character(), path, fps=fps)
-    outing = Outing(
+    outing = Outing.of(
+        composition,
+        loaded,
         title=f"A walk by chance through {graph.name}",
         subtitle=f"{composition.motion.duration:.0f} s, {len(composition.jumps)} jumps, "
         f"seed {seed or 0}",
-        composition=composition,
         about={"seed": seed or 0},
     )
     finish(out, loaded, outing, video, as_json)
@@ -166,13 +183,13 @@ def finish(out: Path, graph: MotionGraph, outing: Outing, video: bool, as_json: 
 def tell_outing(content: dict[str, Any], out: Path) -> str:
     """What came of an outing, for people."""
     happened = content["happened"]
-    skate = happened["foot_skate_fitted_m"]
+    skate, blended = happened["foot_skate_m"], happened.get("foot_skate_as_blended_m")
+    before = f"; as blended {1000 * blended['median']:.0f} mm" if blended else ""
     lines = [
         content["title"],
         f"  {happened['way_m']:.1f} m in {happened['seconds']:.1f} s, {happened['jumps']} jumps",
-        f"  feet slide {1000 * skate['median']:.0f} mm a stance (median of {skate['stances']}), "
-        f"{1000 * skate['percentile_95']:.0f} mm at the 95th percentile; as blended "
-        f"{1000 * happened['foot_skate_as_blended_m']['median']:.0f} mm",
+        f"  feet slide {1000 * skate['median']:.0f} mm a stance (median), "
+        f"{1000 * skate['percentile_95']:.0f} mm at the 95th percentile{before}",
     ]
     if content["graph"]["built_in_clips"]:
         lines.append("  made of built-in motion, no motion capture")

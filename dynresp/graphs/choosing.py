@@ -86,10 +86,11 @@ def choice_outing(
 
         write_options([(action.path, action.pose) for action in offered], words, path)
 
-    return Outing(
+    return Outing.of(
+        composition,
+        graph,
         title="A walk by choice",
         subtitle=f"{picks} actions picked, {len(told) - picks} times left to chance, seed {seed}",
-        composition=composition,
         about={"seed": seed, "choices": told, "clusters": len(forest.clusters)},
         writers={OPTIONS: options} if offered else {},
     )

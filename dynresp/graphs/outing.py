@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.skating import foot_skates
 from dynresp.response.quality import joint_speed_steps
-from dynresp.view.story import Block, GroundPath, Story
+from dynresp.view.story import Block, Event, GroundPath, MovingSphere, Phase, Story
 
 PLAN = "plan.png"
 FILES = ("motion.npz", "motion.bvh", "recording.html", "filmstrip.png", PLAN, "video.mp4")
@@ -30,27 +30,45 @@ FILES = ("motion.npz", "motion.bvh", "recording.html", "filmstrip.png", PLAN, "v
 _VIDEO_PX, _VIDEO_FPS = (640, 480), 30.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outing:
     """What an avatar did.
 
     Attributes:
         title: First line of the pictures.
         subtitle: Second line.
-        composition: Its motion.
+        motion: Its motion.
+        jumps_s: When it jumped in the graph [s].
+        sliding: The motion before its feet were fitted; None where that is not known.
         blocks: What stood about.
         paths: What was drawn on the ground.
+        spheres: Balls.
+        events: Moments with names.
+        phases: What drove the avatar when.
         about: Further content of `result.json`.
         writers: What writes further files, by name.
     """
 
     title: str
     subtitle: str
-    composition: Composition
+    motion: Motion
+    jumps_s: Sequence[float]
+    sliding: Motion | None = None
     blocks: Sequence[Block] = ()
     paths: Sequence[GroundPath] = ()
-    about: dict[str, Any] | None = None
-    writers: dict[str, Writer] | None = None
+    spheres: Sequence[MovingSphere] = ()
+    events: Sequence[Event] = ()
+    phases: Sequence[Phase] = ()
+    about: dict[str, Any] = field(default_factory=dict)
+    writers: dict[str, Writer] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, composition: Composition, graph: MotionGraph, **rest: Any) -> Outing:
+        """The outing of a walk that was composed as a whole; the rest as the class takes it."""
+        motion = composition.motion
+        jumps_s = (composition.jumps / graph.config.fps).tolist()
+        sliding = replace(motion, poses=composition.sliding)
+        return cls(motion=motion, jumps_s=jumps_s, sliding=sliding, **rest)
 
 
 def write_outing(
@@ -78,30 +96,31 @@ def write_outing(
     Raises:
         DynrespError: `result.json` cannot be written.
     """
-    composition = outing.composition
-    standing, bars = standing_about(graph.database.world, len(composition.motion))
+    standing, bars = standing_about(graph.database.world, len(outing.motion))
     story = Story(
-        motion=composition.motion,
+        motion=outing.motion,
+        spheres=outing.spheres,
+        events=outing.events,
+        phases=outing.phases,
         blocks=[*outing.blocks, *standing],
         capsules=bars,
         paths=outing.paths,
         title=outing.title,
         subtitle=outing.subtitle,
     )
-    jumped_s = composition.jumps / graph.config.fps
 
     def plan(path: Path) -> None:
         from dynresp.view.plan_view import write_plan
 
-        write_plan(story, path, jumped_s[jumped_s <= story.duration].tolist())
+        write_plan(story, path, [at for at in outing.jumps_s if at <= story.duration])
 
     writers = {
         **story_writers(story, character, _VIDEO_PX, _VIDEO_FPS, progress),
         PLAN: plan,
-        **(outing.writers or {}),
+        **outing.writers,
     }
     names = [name for name in FILES if video or name != "video.mp4"]
-    names += list(outing.writers or {})
+    names += list(outing.writers)
     files = write_files(folder, names, writers, progress)
     there = [name for name, what in files.items() if what == WRITTEN]
     left = clear_response(folder, [RESULT, *there])
@@ -109,8 +128,8 @@ def write_outing(
     content = {
         "title": outing.title,
         "graph": about_graph(graph),
-        "happened": figures(graph, composition, character),
-        **(outing.about or {}),
+        "happened": figures(outing, character),
+        **outing.about,
         "files": files,
         "versions": versions(),
     }
@@ -132,26 +151,30 @@ def about_graph(graph: MotionGraph) -> dict[str, Any]:
     }
 
 
-def figures(graph: MotionGraph, composition: Composition, character: Character) -> dict[str, Any]:
-    """What came of a walk, in numbers; slides before and after the feet were fitted."""
-    motion = composition.motion
+def figures(outing: Outing, character: Character) -> dict[str, Any]:
+    """What came of an outing, in numbers; slides as blended, if known, and with feet fitted."""
+    motion = outing.motion
     track = motion.root_positions[:, :2]
     way = float(np.linalg.norm(np.diff(track, axis=0), axis=1).sum())
-    sliding = Motion(composition.sliding, motion.fps, motion.name, motion.contacts)
     steps = joint_speed_steps(motion)
     said: dict[str, Any] = {
         "seconds": motion.duration,
         "way_m": way,
         "speed_m_s": way / motion.duration if motion.duration > 0 else 0.0,
-        "jumps": len(composition.jumps),
+        "jumps": len(outing.jumps_s),
         "joint_speed_step_99_rad_s": float(np.percentile(steps, 99.0)) if steps.size else 0.0,
+        "foot_skate_m": _skate(motion, character),
     }
-    for name, played in (("as_blended", sliding), ("fitted", motion)):
-        slips = foot_skates(played, character)
-        said[f"foot_skate_{name}_m"] = {
-            "stances": len(slips),
-            "median": float(np.median(slips)) if len(slips) else 0.0,
-            "percentile_95": float(np.percentile(slips, 95.0)) if len(slips) else 0.0,
-            "worst": float(np.max(slips)) if len(slips) else 0.0,
-        }
+    if outing.sliding is not None:
+        said["foot_skate_as_blended_m"] = _skate(outing.sliding, character)
     return said
+
+
+def _skate(motion: Motion, character: Character) -> dict[str, Any]:
+    """How far feet slide a stance [m]."""
+    slips = foot_skates(motion, character) or [0.0]
+    return {
+        "median": float(np.median(slips)),
+        "percentile_95": float(np.percentile(slips, 95.0)),
+        "worst": float(np.max(slips)),
+    }

@@ -88,11 +88,12 @@ def sketch_outing(
         drawn.append(GroundPath("path between the obstacles", walk.path))
     mean = float(walk.off_path.mean())
     seconds = (len(walk.frames) - 1) / graph.config.fps
-    return Outing(
+    return Outing.of(
+        composition,
+        graph,
         title="A walk along a sketch" if path is not None else "A walk to a goal",
         subtitle=f"{'arrived' if walk.arrived else 'did not arrive'}, on average {mean:.2f} m off "
         "the path",
-        composition=composition,
         blocks=blocks_of(world),
         paths=drawn,
         about={"sketch": _about(walk, seconds), "maze": asked.seed if asked.maze else None},

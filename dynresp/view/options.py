@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from dynresp.files import replacing
 from dynresp.motion.character import default_character
 from dynresp.motion.rotations import FloatArray
 from dynresp.view import raster, shapes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _INK = (0.14, 0.15, 0.18)
 _FAINT_INK = (0.48, 0.51, 0.55)
@@ -49,9 +55,9 @@ def write_options(
     for number, (way, pose) in enumerate(actions):
         color = _COLORS[number % len(_COLORS)]
         plan.plot(*way[:, :2].T, color=color, lw=2.0)
-        plan.annotate("", way[-1, :2] + 0.3 * _ahead(way[-1, 3]), way[-1, :2],
-                      arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.5})  # fmt: skip
-        plan.text(*way[-1, :2], f" {number + 1}", color=color, fontsize=13, fontweight="bold")
+        _arrow(plan, way[-1], 0.3, color)
+        x, y = (float(v) for v in way[-1, :2])
+        plan.text(x, y, f" {number + 1}", color=color, fontsize=13, fontweight="bold")
         cell = figure.add_axes(_cell(number, count))
         cell.set_axis_off()
         picture = _figure_of(pose)
@@ -65,15 +71,18 @@ def write_options(
         cell.text(0.5, -0.02, words[number].replace(", ", ",\n"), transform=cell.transAxes,
                   ha="center", va="top", fontsize=7.5, color=_INK)  # fmt: skip
     plan.plot(*start[:2], ls="", marker="o", ms=8, mfc="white", mec=_INK, mew=1.5)
-    plan.annotate("", start[:2] + 0.35 * _ahead(start[3]), start[:2],
-                  arrowprops={"arrowstyle": "-|>", "color": _INK, "lw": 1.5})  # fmt: skip
+    _arrow(plan, start, 0.35, _INK)
     figure.text(0.05, 0.95, "Actions to choose from", fontsize=12, fontweight="bold", color=_INK)
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png")
 
 
-def _ahead(yaw: float) -> FloatArray:
-    return np.array([np.cos(yaw), np.sin(yaw)])
+def _arrow(axes: Axes, at: FloatArray, length: float, color: shapes.Color) -> None:
+    """An arrow that shows where one faces at (4,) x, y, z [m] and yaw [rad]."""
+    x, y, _, yaw = (float(v) for v in at)
+    tip = (x + length * math.cos(yaw), y + length * math.sin(yaw))
+    style = {"arrowstyle": "-|>", "color": color, "lw": 1.5}
+    axes.annotate("", tip, (x, y), arrowprops=style)
 
 
 def _cell(number: int, count: int) -> tuple[float, float, float, float]:
@@ -84,7 +93,7 @@ def _cell(number: int, count: int) -> tuple[float, float, float, float]:
     return (0.52 + 0.235 * column, 0.95 - (row + 1) * height + 0.09, 0.22, height - 0.13)
 
 
-def _figure_of(pose: FloatArray) -> FloatArray:
+def _figure_of(pose: FloatArray) -> npt.NDArray[np.uint8]:
     """A person in a pose, seen from ahead and a little aside, as an RGBA picture."""
     from dynresp.motion import rotations
 

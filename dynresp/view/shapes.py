@@ -198,7 +198,9 @@ def capsule(radius: float, half_length: float, color: Color) -> Mesh:
 def box(half_sizes: Sequence[float], color: Color) -> Mesh:
     """A box about the origin; half_sizes are half its sides [m]."""
     size = np.asarray(half_sizes, dtype=np.float64)
-    vertices, normals, faces = [], [], []
+    vertices: list[FloatArray] = []
+    normals: list[FloatArray] = []
+    faces: list[tuple[int, int, int]] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             normal = np.zeros(3)

@@ -99,7 +99,7 @@ class TestWalk:
         motion = read_npz(out / "motion.npz")
         assert motion.fps == 30.0
         assert motion.duration == pytest.approx(4.0)
-        assert content["happened"]["foot_skate_fitted_m"]["median"] < 0.01
+        assert content["happened"]["foot_skate_m"]["median"] < 0.01
         for name in ("filmstrip.png", "plan.png"):
             assert (out / name).read_bytes().startswith(PNG)
         assert "made of built-in motion" in result.stdout
@@ -131,6 +131,18 @@ class TestWalk:
         result = dynresp("graph", "walk", graph, "--out", tmp_path / "out", "--choices", choices)
         assert result.exit_code == 2
         assert said in result.stderr
+
+    def test_with_balls(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        out = tmp_path / "out"
+        words = ("--balls", "--seconds", 8, "--seed", 1, "--no-video", "--json")
+        result = dynresp("graph", "walk", graph, "--out", out, *words)
+        assert result.exit_code == 0, result.stderr
+        content = json.loads(result.stdout)
+        assert content["happened"]["seconds"] == pytest.approx(8.0, abs=0.1)
+        assert content["choice"]["budget"] == "fast"
+        assert {name for name, what in content["files"].items() if what == "written"} == FILES
+        wrong = dynresp("graph", "walk", graph, "--out", out, "--balls", "--choices", "1")
+        assert wrong.exit_code == 2
 
     def test_a_file_in_the_way(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
         (tmp_path / "out").write_text("mine")
