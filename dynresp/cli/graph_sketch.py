@@ -54,11 +54,13 @@ def sketch(
 ) -> None:
     """Walk along a sketched path around obstacles, or to a goal.
 
-    In a maze without a path it goes from corner to corner. Writes result.json, motion.npz,
+    In a maze without a path it goes from corner to corner; so it does over rough terrain, which is
+    drawn from the seed and reaches from 0 to 12.2 m along x and y. Writes result.json, motion.npz,
     motion.bvh, recording.html, filmstrip.png, plan.png and, where the machine can render,
     video.mp4.
     """
-    from dynresp.graphs.sketching import Asked, sketch_outing
+    from dynresp.graphs.asked import Asked
+    from dynresp.graphs.sketching import sketch_outing
     from dynresp.graphs.world_file import read_world
     from dynresp.locomotion.graph_file import load_graph
     from dynresp.motion.character import default_character

@@ -87,6 +87,14 @@ def walk(
         )
         finish(out, loaded, chosen, video, as_json)
         return
+    if loaded.database.world == "terrain":
+        from dynresp.graphs.asked import Asked
+        from dynresp.graphs.terrain_outing import terrain_outing
+
+        asked = Asked(seed=seed or 0)
+        over = terrain_outing(loaded, default_character(), asked, seconds, fps)
+        finish(out, loaded, over, video, as_json)
+        return
     frames = max(2, round(seconds * loaded.config.fps) + 1)
     path = random_walk(loaded, frames, np.random.default_rng(seed or 0))
     composition = compose(loaded, default_character(), path, fps=fps)

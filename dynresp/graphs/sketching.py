@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dynresp.errors import UsageError
+from dynresp.graphs.asked import Asked
 from dynresp.graphs.outing import Outing
+from dynresp.graphs.terrain_outing import terrain_outing
+from dynresp.graphs.worlds import TERRAIN
 from dynresp.locomotion.composing import compose
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.locomotion.search import SearchGraph, State
@@ -16,27 +18,7 @@ from dynresp.locomotion.sketch import SketchedWalk, follow_sketch, reach
 from dynresp.locomotion.worlds.maze import random_maze
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion.character import Character
-from dynresp.motion.rotations import FloatArray
 from dynresp.view.story import Block, GroundPath
-
-
-@dataclass(frozen=True, eq=False)
-class Asked:
-    """What was asked of an avatar.
-
-    Attributes:
-        path: (k, 2) corners of the path to walk along [m]; None for none.
-        goal: Where to go instead [m].
-        start: Where it begins [m]; None for where the path does, else the origin.
-        maze: Whether it goes through a random maze; without path or goal from corner to corner.
-        seed: Of the maze.
-    """
-
-    path: FloatArray | None = None
-    goal: tuple[float, float] | None = None
-    start: tuple[float, float] | None = None
-    maze: bool = False
-    seed: int = 0
 
 
 def sketch_outing(
@@ -60,6 +42,14 @@ def sketch_outing(
         DynrespError: There is no way between the obstacles.
     """
     path, goal, start = asked.path, asked.goal, asked.start
+    if path is not None and goal is not None:
+        raise UsageError("give a path by --points or --path, or a place to reach by --goal")
+    if path is not None and len(path) < 2:
+        raise UsageError(f"a path needs two corners or more, got {len(path)}")
+    if graph.database.world == TERRAIN:
+        if asked.maze or world is not None:
+            raise UsageError("over rough terrain there are no obstacles; leave out --world, --maze")
+        return terrain_outing(graph, character, asked, fps=fps)
     if asked.maze:
         if world is not None:
             raise UsageError("give obstacles by --world or by --maze, not by both")
@@ -69,10 +59,8 @@ def sketch_outing(
             goal = (float(maze.solution[-1, 0]), float(maze.solution[-1, 1]))
         if path is None and start is None:
             start = (float(maze.solution[0, 0]), float(maze.solution[0, 1]))
-    if (path is None) == (goal is None):
+    if path is None and goal is None:
         raise UsageError("give a path by --points or --path, or a place to reach by --goal")
-    if path is not None and len(path) < 2:
-        raise UsageError(f"a path needs two corners or more, got {len(path)}")
     if start is None:
         start = (0.0, 0.0) if path is None else (float(path[0, 0]), float(path[0, 1]))
     search = SearchGraph(graph, character)

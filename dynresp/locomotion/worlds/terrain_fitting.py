@@ -1,0 +1,302 @@
+"""From a walk over blocks to a motion whose feet stand on them, and a check of that.
+
+What is played is blended, so a foot may come down beside its block, and the walk allows stances
+that are higher or lower than recorded. First the feet are fitted as on level ground, which stops
+them from sliding. Then each stance is put on its block: to its height, and away from edges at which
+the height changes. In a swing the shift passes from one stance's to the next, and the foot is
+raised over the blocks on its way. The root follows the feet.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynresp.errors import UsageError
+from dynresp.locomotion.composing import Composition, compose
+from dynresp.locomotion.worlds.contacts import sole_corners
+from dynresp.locomotion.worlds.terrain import Terrain
+from dynresp.locomotion.worlds.terrain_graph import IntArray, TerrainGraph, runs
+from dynresp.locomotion.worlds.terrain_walk import TerrainWalk
+from dynresp.motion import legs, rotations
+from dynresp.motion.character import BodyStates, Character
+from dynresp.motion.foot_fitting import FitConfig
+from dynresp.motion.motion import FEET, Motion
+from dynresp.motion.rotations import FloatArray
+from dynresp.motion.skating import foot_slides
+
+_FIT = FitConfig(farthest=0.4, deepest=0.12)
+
+
+@dataclass(frozen=True)
+class TerrainFitConfig:
+    """How feet are put on blocks.
+
+    Attributes:
+        edge_m: Distance that soles keep from edges at which the height changes [m].
+        clear_m: Height by which a swinging sole passes over blocks [m].
+        lift_s: Time in which it gets as high as that [s].
+        climb: How fast a foot is raised for that at most [m/s].
+        follow_s: Time over which the root follows the feet [s].
+        straight: Part of its length to which a leg is stretched at most.
+
+    Raises:
+        UsageError: A number makes no sense.
+    """
+
+    edge_m: float = 0.01
+    clear_m: float = 0.02
+    lift_s: float = 0.12
+    climb: float = 1.0
+    follow_s: float = 0.5
+    straight: float = 0.99
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("edge_m", "clear_m"):
+            if not getattr(self, name) >= 0:
+                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
+        for name in ("lift_s", "climb", "follow_s", "straight"):
+            if not getattr(self, name) > 0:
+                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """How the feet of a motion stand on blocks, stance by stance. A stance is a run of contact.
+
+    Attributes:
+        off_height: (s,) how far the lowest point of the sole is above or below its block, at the
+            worst moment of each stance [m].
+        overhang: (s,) how far the sole sticks out over an edge at which the ground is lower,
+            the median over each stance [m].
+        slide: (s,) the way that the foot slides [m].
+        sunk: (frames,) how deep a sole is in a block, whether it stands or swings [m].
+    """
+
+    off_height: FloatArray
+    overhang: FloatArray
+    slide: FloatArray
+    sunk: FloatArray
+
+
+def compose_on_terrain(
+    graph: TerrainGraph,
+    terrain: Terrain,
+    walk: TerrainWalk,
+    fps: float | None = None,
+    fit: FitConfig | None = None,
+    config: TerrainFitConfig | None = None,
+) -> Composition:
+    """Play a walk over blocks, with its feet on them.
+
+    Args:
+        graph: Where the walk was found.
+        terrain: The blocks.
+        walk: The walk; two frames or more.
+        fps: Frame rate of the motion, by default the graph's.
+        fit: How feet are kept from sliding; by default feet are held farther from where they are
+            played than on level ground, since so little was recorded that jumps are rough.
+        config: How they are put on the blocks.
+
+    Returns:
+        As `compose`; `motion` is fitted to the blocks. `sliding` is at the heights that were
+        recorded, which are not those of the blocks where the walk changes steps.
+    """
+    config = config or TerrainFitConfig()
+    character, rate = graph.character, graph.graph.config.fps
+    played = compose(graph.graph, character, walk.frames, walk.placements[0], fps, fit or _FIT)
+    motion = played.motion
+    blocks = walk_blocks(walk, rate, motion)
+    poses = _put_on_blocks(character, terrain, motion, blocks, config)
+    fitted = Motion(poses, motion.fps, "walk over blocks", motion.contacts)
+    return Composition(played.frames, fitted, played.jumps, walk.placements, played.sliding)
+
+
+def walk_blocks(walk: TerrainWalk, rate: float, motion: Motion) -> IntArray:
+    """The block on which each foot of a composed walk is to stand.
+
+    Args:
+        walk: The walk.
+        rate: Its frame rate [1/s].
+        motion: What was composed of it.
+
+    Returns:
+        (n, 2, 2) column and row; -1 where a foot does not stand.
+    """
+    at = np.arange(len(motion)) * rate / motion.fps
+    # As `compose` takes the contacts: half way between two frames the later one counts.
+    nearest = np.minimum(np.floor(at + 0.5 + 1e-9).astype(np.intp), len(walk.frames) - 1)
+    return np.where(motion.contacts[..., None], walk.blocks[nearest], -1)
+
+
+def footing(character: Character, terrain: Terrain, motion: Motion, blocks: IntArray) -> Footing:
+    """Check how feet stand.
+
+    Args:
+        character: The character.
+        terrain: The blocks.
+        motion: The motion, with its contacts.
+        blocks: (n, 2, 2) the block on which each foot is to stand; see `walk_blocks`.
+    """
+    states = character.kinematics(motion.poses)
+    soles = sole_corners(character, states)
+    slides = foot_slides(character, states)
+    beneath = terrain.height(soles)
+    cells = (soles[..., :2] - terrain.corner) / terrain.block_m
+    inward = np.abs(cells - np.round(cells)).min(axis=-1) * terrain.block_m
+    depth = np.nan_to_num(np.minimum(beneath - soles[..., 2], inward), nan=0.0)
+    off, over, slide = [], [], []
+    for foot in range(2):
+        for start, stop in runs(motion.contacts[:, foot]):
+            rows = slice(start, stop)
+            top = terrain.levels[tuple(blocks[rows, foot].T)] * terrain.level_m
+            off.append(np.abs(soles[rows, foot, :, 2].min(axis=1) - top).max())
+            lower = ~(beneath[rows, foot] > top[:, None] - 0.5 * terrain.level_m)
+            corner = terrain.corner + blocks[rows, foot, None] * terrain.block_m
+            xy = soles[rows, foot, :, :2]
+            out = np.maximum(corner - xy, xy - corner - terrain.block_m).max(axis=-1)
+            over.append(np.median(np.where(lower, np.maximum(out, 0.0), 0.0).max(axis=1)))
+            slide.append(slides[start : stop - 1, foot].sum())
+    return Footing(
+        np.array(off), np.array(over), np.array(slide), np.maximum(depth, 0.0).max(axis=(1, 2))
+    )
+
+
+def _put_on_blocks(
+    character: Character,
+    terrain: Terrain,
+    motion: Motion,
+    blocks: IntArray,
+    config: TerrainFitConfig,
+) -> FloatArray:
+    """Poses (n, 59) with every stance on its block."""
+    states = character.kinematics(motion.poses)
+    soles, ankles = sole_corners(character, states), legs.ankle_positions(character, states)
+    shift = np.zeros((len(motion), 2, 3))
+    for foot in range(2):
+        stances = runs(motion.contacts[:, foot])
+        for start, stop in stances:
+            rows = slice(start, stop)
+            block = blocks[start, foot]
+            sole = np.median(soles[rows, foot], axis=0)
+            shift[rows, foot, :2] = drawn_in(terrain, block, sole, config.edge_m)
+            top = terrain.levels[tuple(block)] * terrain.level_m
+            shift[rows, foot, 2] = top - soles[rows, foot, :, 2].min(axis=1)
+        _pass_on(shift[:, foot], stances)
+        _raise(terrain, soles[:, foot], shift[:, foot], stances, motion.fps, config)
+    root = _smooth(shift.mean(axis=1), motion.fps, config.follow_s)
+    root[:, 2] -= _lowering(character, states, ankles + shift, root, motion.fps, config)
+    poses = np.array(motion.poses)
+    poses[:, :3] += root
+    return legs.place_ankles(character, poses, ankles + shift)
+
+
+def drawn_in(terrain: Terrain, block: IntArray, sole: FloatArray, edge: float) -> FloatArray:
+    """(2,) the least shift that takes a sole away from edges at which the height changes [m].
+
+    Args:
+        terrain: The blocks.
+        block: (2,) column and row of the block that it stands on.
+        sole: (4, 2 or more) its corners [m].
+        edge: How far it keeps from such edges [m].
+    """
+    corner = terrain.corner + block * terrain.block_m
+    high = np.max(sole[:, :2], axis=0) - corner - terrain.block_m + edge
+    low = corner - np.min(sole[:, :2], axis=0) + edge
+    # Along x and along y: the step across the edge that the sole reaches over, and by how much.
+    step = np.where(high > 0, 1, np.where(low > 0, -1, 0))
+    over = np.maximum(np.maximum(high, low), 0.0)
+    here = terrain.levels[tuple(block)]
+    shift = np.zeros(2)
+    for axis in range(2):
+        across = np.zeros(2, dtype=np.int64)
+        across[axis] = step[axis]
+        if _level(terrain, block + across) != here:
+            shift[axis] = -step[axis] * over[axis]
+    if not shift.any() and step.all() and _level(terrain, block + step) != here:
+        axis = int(np.argmin(over))
+        shift[axis] = -step[axis] * over[axis]
+    return shift
+
+
+def _level(terrain: Terrain, block: IntArray) -> int | None:
+    """Level of a block; None beside the grid."""
+    if np.all((block >= 0) & (block < terrain.levels.shape)):
+        return int(terrain.levels[tuple(block)])
+    return None
+
+
+def _pass_on(shift: FloatArray, stances: list[tuple[int, int]]) -> None:
+    """Fill in the shift (n, 3) of a foot before, between and after its stances."""
+    if not stances:
+        return
+    shift[: stances[0][0]] = shift[stances[0][0]]
+    shift[stances[-1][1] :] = shift[stances[-1][1] - 1]
+    for (_, stop), (start, _) in itertools.pairwise(stances):
+        share = rotations.ease(np.arange(1, start - stop + 1) / (start - stop + 1))[:, None]
+        shift[stop:start] = shift[stop - 1] + share * (shift[start] - shift[stop - 1])
+
+
+def _raise(
+    terrain: Terrain,
+    soles: FloatArray,
+    shift: FloatArray,
+    stances: list[tuple[int, int]],
+    fps: float,
+    config: TerrainFitConfig,
+) -> None:
+    """Raise a foot (its shift, in place) over the blocks on the way of its swings."""
+    from scipy import ndimage
+
+    there = soles + shift[:, None]
+    need = np.nan_to_num(terrain.height(there) - there[..., 2], nan=-np.inf).max(axis=1)
+    stands = np.zeros(len(need), dtype=bool)
+    for start, stop in stances:
+        stands[start:stop] = True
+    # Frames to the nearest one in which it stands: it leaves the ground and comes back to it.
+    away = ndimage.distance_transform_edt(~stands) if stances else np.full(len(need), np.inf)
+    half = max(1, round(config.lift_s * fps))
+    wanted = need + config.clear_m * rotations.ease(np.minimum(away / half, 1.0))
+    wanted = np.where(stands, 0.0, np.maximum(wanted, 0.0))
+    highest = ndimage.maximum_filter1d(wanted, 2 * half + 1, mode="nearest")
+    raised = _smooth(highest[:, None], fps, 2.0 * config.lift_s)[:, 0]
+    shift[:, 2] += np.minimum(raised, config.climb * away / fps)
+
+
+def _lowering(
+    character: Character,
+    states: BodyStates,
+    ankles: FloatArray,
+    root: FloatArray,
+    fps: float,
+    config: TerrainFitConfig,
+) -> FloatArray:
+    """How far the root must be lowered for the legs to reach the ankles (n,) [m], smoothed."""
+    from scipy import ndimage
+
+    need = np.zeros(len(root))
+    for i, side in enumerate(FEET):
+        thigh, shank, foot = (character.body(f"{side}_{x}") for x in ("thigh", "shank", "foot"))
+        length = config.straight * float(
+            np.linalg.norm(character.offsets[shank]) + np.linalg.norm(character.offsets[foot])
+        )
+        before = np.linalg.norm(states.positions[:, thigh] - states.positions[:, foot], axis=1)
+        reach = np.maximum(length, before)
+        away = states.positions[:, thigh] + root - ankles[:, i]
+        across = np.sum(away[:, :2] ** 2, axis=1)
+        need = np.maximum(need, away[:, 2] - np.sqrt(np.maximum(reach**2 - across, 0.0)))
+    half = max(1, round(0.5 * config.follow_s * fps))
+    highest = ndimage.maximum_filter1d(need, 2 * half + 1, mode="nearest")
+    return _smooth(highest[:, None], fps, config.follow_s)[:, 0]
+
+
+def _smooth(values: FloatArray, fps: float, time_s: float) -> FloatArray:
+    """Values (n, columns) averaged over a time."""
+    half = max(1, round(0.5 * time_s * fps))
+    kernel = np.hanning(2 * half + 3)[1:-1]
+    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    columns = [np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T]
+    return np.stack(columns, axis=1)

@@ -1,0 +1,392 @@
+"""An avatar on rough terrain: it walks where its user points, and stands on blocks alone.
+
+The graph is one in `Coordinates.BLOCKS`, of motion recorded over blocks (Lee et al. 2002, sections
+4.1.2 and 6). The way is found by best-first search with eq. 8 as the objective, and backtracking:
+what waits in the heap is any state reached so far, not only where the avatar is. A way is taken
+only if each foot that stands in it stands on a block.
+
+45 s of recorded walking hold few of the steps that a terrain asks for. So a stance may be higher or
+lower than recorded by whole levels, if the one before it is nearly as much, and a foot that would
+stick out over an edge may be drawn in; both cost, and `terrain_fitting` bends the legs for it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.errors import UsageError
+from dynresp.locomotion import placement
+from dynresp.locomotion.search import State
+from dynresp.locomotion.walk import check_in_component
+from dynresp.locomotion.worlds.planning import resampled
+from dynresp.locomotion.worlds.terrain import Terrain
+from dynresp.locomotion.worlds.terrain_graph import IntArray, TerrainGraph
+from dynresp.motion.rotations import FloatArray
+
+# Distance of the points of a path [m].
+_SPACING = 0.1
+# Starts that are tried, and for how long one must be able to go on [s].
+_STARTS, _ON_S = 300, 4.0
+# Most states looked at for a start, and for a stretch of a walk at random.
+_STRETCH_BUDGET = 10_000
+# How far away the next place of a walk at random is [m], how many are tried before a stretch is
+# taken back, and how many stretches are.
+_NEAREST_M, _FARTHEST_M, _TRIES = 1.5, 6.0, 20
+# What eq. 8 counts against the costs: where the budget was spent, the search begins anew greedier.
+_GREED = (1.0, 2.0, 4.0, 8.0)
+# What a turn away from the wanted direction counts when a start is chosen [m/rad].
+_TURN = 0.3
+
+
+@dataclass(frozen=True)
+class TerrainWalkConfig:
+    """What a good way over blocks is, and how long one is looked for.
+
+    Attributes:
+        facing: c of eq. 8, at least 0 and below 1.
+        ahead_m: How far ahead on a path the point is that the avatar should face [m].
+        pace: What a second costs [m].
+        stray: At a distance d from a path a second costs 1 + stray d^2 times as much [1/m^2].
+        farthest_m: Ways that lead farther from a path than this are dropped [m].
+        jump: What a jump costs for each unit of its distance (eq. 2) [m].
+        hurry: What it costs besides if it comes at once after another [m],
+        haste_s: falling to nothing when it is this much later [s].
+        adapt: By how many levels a stance may be higher or lower than recorded, seen from the
+            other foot's last; 0 allows recorded steps alone.
+        stretch: What that costs for each squared level [m].
+        draw_m: How far a foot is drawn in from an edge at most [m].
+        draw: What a metre of that costs [m].
+        edge_m: Distance that soles are to keep from edges [m].
+        arrival_m: How near to the end the root must come [m].
+        budget: Most states to go on from; then the search begins anew, greedier, some times.
+
+    Raises:
+        UsageError: A number makes no sense.
+    """
+
+    facing: float = 0.2
+    ahead_m: float = 0.6
+    pace: float = 0.1
+    stray: float = 2.0
+    farthest_m: float = 2.0
+    jump: float = 1.0
+    hurry: float = 0.3
+    haste_s: float = 1.0
+    adapt: int = 2
+    stretch: float = 0.2
+    draw_m: float = 0.08
+    draw: float = 2.0
+    edge_m: float = 0.01
+    arrival_m: float = 0.3
+    budget: int = 100_000
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not 0 <= self.facing < 1:
+            raise UsageError(f"facing must be at least 0 and below 1, got {self.facing}")
+        for name in ("ahead_m", "pace", "stray", "jump", "hurry", "adapt", "stretch", "draw_m",
+                     "draw", "edge_m"):  # fmt: skip
+            if not getattr(self, name) >= 0:
+                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
+        for name in ("farthest_m", "haste_s", "arrival_m", "budget"):
+            if not getattr(self, name) > 0:
+                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, eq=False)
+class TerrainWalk:
+    """A walk over blocks. Arrays are read-only.
+
+    Attributes:
+        frames: (k,) the walk, beginning with the frame of the start.
+        placements: (k, 4) where their clips are put: whole blocks and levels, quarter turns. Where
+            steps are not as high as recorded they rise and sink, so that what stands is as near to
+            its blocks as can be.
+        roots: (k, 4) x, y, z [m] and yaw [rad] of the root, as recorded and put there.
+        blocks: (k, 2, 2) column and row of the block on which each foot stands; -1 where it does
+            not stand.
+        arrived: Whether it goes as far as asked; if not, the terrain offers no way on, or the
+            budget was spent.
+        off_goal: Distance of the last root from the goal [m]; not a number where there is none.
+        looked: States gone on from.
+        taken_back: Stretches of a walk at random that were taken back because they led nowhere.
+        planning_s: Time that the search took [s].
+    """
+
+    frames: npt.NDArray[np.int32]
+    placements: FloatArray
+    roots: FloatArray
+    blocks: IntArray
+    arrived: bool
+    off_goal: float
+    looked: int
+    taken_back: int
+    planning_s: float
+
+
+def start_on_terrain(
+    graph: TerrainGraph,
+    terrain: Terrain,
+    at: npt.ArrayLike,
+    toward: npt.ArrayLike,
+    config: TerrainWalkConfig | None = None,
+) -> State:
+    """A state to begin from: standing near a place, facing another, and with a way on.
+
+    Args:
+        graph: Whose frames.
+        terrain: The blocks.
+        at: (2,) where the root should be [m].
+        toward: (2,) what it should face [m].
+        config: What a good way is.
+
+    Raises:
+        UsageError: No frame of the graph stands on the blocks there and can go on.
+    """
+    graph.check(terrain)
+    small = dataclasses.replace(config or TerrainWalkConfig(), budget=_STRETCH_BUDGET)
+    here, goal = (np.asarray(x, dtype=np.float64)[:2] for x in (at, toward))
+    frames = graph.graph.frames
+    frames = frames[graph.stands[frames].any(axis=1)]
+    cells, costs = [], []
+    for turns in range(4):
+        turn = np.array([0.0, 0.0, 0.0, 0.5 * np.pi * turns])
+        roots = placement.compose(turn, graph.graph.database.planar[frames])
+        shift = (here - np.array(terrain.corner) - roots[:, :2]) / terrain.block_m
+        cells.append(np.round(shift).astype(np.int64))
+        off = np.hypot(*(shift - cells[-1]).T) * terrain.block_m
+        away = np.arctan2(*(goal - here)[::-1]) - roots[:, 3]
+        costs.append(off + _TURN * np.abs(placement.wrapped(away)))
+    for k in np.argsort(np.concatenate(costs), kind="stable")[:_STARTS]:
+        turns, row = divmod(int(k), len(frames))
+        frame = int(frames[row])
+        place = graph.standing(terrain, frame, cells[turns][row], turns)
+        if place is not None:
+            state = State(frame, graph.meters(terrain, place))
+            found = _search(graph, terrain, state, goal[None], small)
+            if found.arrived or len(found.frames) > _ON_S * graph.graph.database.fps:
+                return state
+    raise UsageError(
+        f"no frame of the graph stands on the blocks about {here} and goes on from there; take "
+        f"a place inside the grid of {terrain.size[0]:g} x {terrain.size[1]:g} m, away from its "
+        "border"
+    )
+
+
+def reach_on_terrain(
+    graph: TerrainGraph,
+    terrain: Terrain,
+    start: State,
+    goal: npt.ArrayLike,
+    config: TerrainWalkConfig | None = None,
+) -> TerrainWalk:
+    """Walk to a place.
+
+    Args:
+        graph: Where the avatar walks through.
+        terrain: The blocks.
+        start: Where it is; see `start_on_terrain`.
+        goal: (2,) the place [m].
+        config: What a good way is.
+
+    Raises:
+        UsageError: The start does not stand on the blocks, or the goal is not on the grid.
+    """
+    end = np.asarray(goal, dtype=np.float64)
+    if end.shape != (2,) or np.isnan(terrain.height(end)):
+        raise UsageError(
+            f"a goal must be x and y inside the grid of {terrain.size[0]:g} x "
+            f"{terrain.size[1]:g} m, got {end}"
+        )
+    return _search(graph, terrain, start, end[None], config or TerrainWalkConfig())
+
+
+def follow_on_terrain(
+    graph: TerrainGraph,
+    terrain: Terrain,
+    start: State,
+    sketch: npt.ArrayLike,
+    config: TerrainWalkConfig | None = None,
+) -> TerrainWalk:
+    """Walk along a sketched path.
+
+    Args:
+        graph: Where the avatar walks through.
+        terrain: The blocks.
+        start: Where it is; see `start_on_terrain`. The path begins there even if the sketch
+            does not.
+        sketch: (k, 2) corners of a path on the ground [m].
+        config: What a good way is.
+
+    Raises:
+        UsageError: The start does not stand on the blocks, or the sketch is none.
+    """
+    root = start.root(graph.graph)[:2]
+    points = resampled(np.asarray(sketch, dtype=np.float64), _SPACING)
+    if np.hypot(*(points[0] - root)) > 2.0 * _SPACING:
+        points = resampled(np.concatenate([root[None], points]), _SPACING)
+    return _search(graph, terrain, start, points, config or TerrainWalkConfig())
+
+
+def wander_on_terrain(
+    graph: TerrainGraph,
+    terrain: Terrain,
+    start: State,
+    frames: int,
+    rng: np.random.Generator,
+    config: TerrainWalkConfig | None = None,
+) -> TerrainWalk:
+    """Walk from one place to the next, all drawn at random.
+
+    A step by step draw, as on level ground, would come to the next block in a stride that does not
+    fit it, and jump at the last moment. Here each stretch is planned to its end. Where no further
+    place can be reached, the last stretch is taken back.
+
+    Args:
+        graph: Where the avatar walks through.
+        terrain: The blocks.
+        start: Where it is; see `start_on_terrain`.
+        frames: How many frames to walk.
+        rng: Source of chance.
+        config: What a good way is; `budget` is for each stretch.
+
+    Returns:
+        The walk; shorter, and `arrived` false, where no place drawn can be reached from the start.
+
+    Raises:
+        UsageError: The start does not stand on the blocks, or there is no frame to walk.
+    """
+    if frames < 1:
+        raise UsageError(f"a walk needs at least 1 frame, got {frames}")
+    config = config or TerrainWalkConfig(budget=_STRETCH_BUDGET)
+    began = time.perf_counter()
+    stretches: list[TerrainWalk] = []
+    played = looked = taken_back = tried = 0
+    while played < frames:
+        at = start
+        if stretches:
+            at = State(int(stretches[-1].frames[-1]), stretches[-1].placements[-1])
+        goal = _place_at_random(terrain, at.root(graph.graph)[:2], rng)
+        found = reach_on_terrain(graph, terrain, at, goal, config)
+        looked += found.looked
+        tried += 1
+        if found.arrived:
+            stretches.append(found)
+            played += len(found.frames) - 1
+            tried = 0
+        elif tried == _TRIES:
+            if not stretches or taken_back == _TRIES:
+                break
+            played -= len(stretches.pop().frames) - 1
+            taken_back += 1
+            tried = 0
+    ways = [np.array([start.frame]), *(stretch.frames[1:] for stretch in stretches)]
+    puts = [start.placement[None], *(stretch.placements[1:] for stretch in stretches)]
+    return _walk(
+        graph, terrain, np.concatenate(ways)[: frames + 1], np.concatenate(puts)[: frames + 1],
+        played >= frames, np.full(2, np.nan), looked, taken_back, began,
+    )  # fmt: skip
+
+
+def _place_at_random(terrain: Terrain, here: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A place on the grid, some metres away where the grid is so large."""
+    for _ in range(_TRIES):
+        place = terrain.corner + rng.random(2) * terrain.size
+        if _NEAREST_M <= np.hypot(*(place - here)) <= _FARTHEST_M:
+            break
+    return np.asarray(place)
+
+
+def _search(
+    graph: TerrainGraph, terrain: Terrain, start: State, path: FloatArray, config: TerrainWalkConfig
+) -> TerrainWalk:
+    from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
+
+    began = time.perf_counter()
+    begin, feet, settings = _begin(graph, terrain, start, config)
+    ways = (graph.graph.offsets, graph.graph.targets, graph.graph.distances, graph.moves)
+    told, looked = np.zeros(2, dtype=np.int64), 0
+    for settings[kernel.GREED] in _GREED:
+        played, places = kernel.search_kernel(
+            start.frame, begin, settings, np.ascontiguousarray(path - terrain.corner),
+            config.budget, ways, graph.planar, feet, terrain.levels.astype(np.int64), told,
+        )  # fmt: skip
+        looked += int(told[1])
+        if told[0] or told[1] < config.budget:
+            break
+    frames = np.concatenate([[start.frame], played])
+    placements = np.concatenate([start.placement[None], graph.meters(terrain, places)])
+    return _walk(graph, terrain, frames, placements, bool(told[0]), path[-1], looked, 0, began)
+
+
+def _begin(
+    graph: TerrainGraph, terrain: Terrain, start: State, config: TerrainWalkConfig
+) -> tuple[IntArray, tuple[npt.NDArray, ...], FloatArray]:  # type: ignore[type-arg]
+    """The place, the feet and the settings with which a kernel begins."""
+    from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
+
+    graph.check(terrain)
+    check_in_component(graph.graph, start.frame)
+    place = graph.place(terrain, start.placement)
+    lifts = np.zeros(2, dtype=np.int64)
+    stands = np.flatnonzero(graph.stands[start.frame])
+    blocks = graph.blocks_under(terrain, [start.frame], start.placement[None])[0, stands]
+    if (blocks < 0).any():
+        raise UsageError("the start stands beside the grid; start_on_terrain gives one that does")
+    if len(stands):
+        lift = terrain.levels[tuple(blocks.T)] - graph.levels[start.frame, stands] - place[2]
+        # A foot in the air has the lift of the other one.
+        lifts[:] = lift[0]
+        lifts[stands] = lift
+    settings = np.zeros(kernel.SETTINGS)
+    settings[kernel.PACE], settings[kernel.STRAY] = config.pace, config.stray
+    settings[kernel.JUMP], settings[kernel.HURRY] = config.jump, config.hurry
+    settings[kernel.HASTE], settings[kernel.FACING] = config.haste_s, config.facing
+    settings[kernel.STRETCH], settings[kernel.ADAPT] = config.stretch, config.adapt
+    settings[kernel.DRAW], settings[kernel.REACH] = config.draw, config.draw_m
+    settings[kernel.AHEAD], settings[kernel.FARTHEST] = config.ahead_m, config.farthest_m
+    settings[kernel.SPACING], settings[kernel.BLOCK] = _SPACING, terrain.block_m
+    settings[kernel.FRAME_TIME] = 1.0 / graph.graph.database.fps
+    settings[kernel.ARRIVAL] = config.arrival_m
+    over = graph.over + config.edge_m
+    over.flags.writeable = False
+    return (
+        np.concatenate([place, lifts]),
+        (graph.stands, graph.blocks, graph.levels, over),
+        settings,
+    )
+
+
+def _walk(
+    graph: TerrainGraph,
+    terrain: Terrain,
+    frames: IntArray,
+    placements: FloatArray,
+    arrived: bool,
+    goal: FloatArray,
+    looked: int,
+    taken_back: int,
+    began: float,
+) -> TerrainWalk:
+    played = frames.astype(np.int32)
+    blocks = graph.blocks_under(terrain, played, placements)
+    stands = blocks[..., 0] >= 0
+    tops = terrain.levels[tuple(np.moveaxis(blocks, -1, 0))] - graph.levels[played]
+    feet = stands.sum(axis=1)
+    # In the air the height is that of the last stance; a walk begins on the ground.
+    last = np.maximum.accumulate(np.where(feet > 0, np.arange(len(played)), 0))
+    level = np.round(np.where(stands, tops, 0).sum(axis=1) / np.maximum(feet, 1))[last]
+    placements = placements.copy()
+    if feet[0] > 0:
+        placements[:, 2] = level * terrain.level_m
+    roots = placement.compose(placements, graph.graph.database.planar[played])
+    for array in (played, placements, roots, blocks):
+        array.flags.writeable = False
+    off = float(np.hypot(*(roots[-1, :2] - goal)))
+    spent = time.perf_counter() - began
+    return TerrainWalk(played, placements, roots, blocks, arrived, off, looked, taken_back, spent)
