@@ -201,3 +201,41 @@ class TestSketch:
         assert result.exit_code == 2, result.output
         assert said in result.stderr
         assert "Traceback" not in result.stderr
+
+
+@pytest.mark.mocap
+@pytest.mark.parametrize("plan", ["terrain", "playground"])
+def test_recorded_worlds(dynresp: Command, tmp_path: Path, motions_folder: Path, plan: str) -> None:
+    graph = tmp_path / "graph.npz"
+    built = dynresp("graph", "build", plan, "--out", graph, "--motions", motions_folder)
+    assert built.exit_code == 0, built.stderr
+    assert "mocap.cs.cmu.edu" in built.stdout
+    walked = dynresp(
+        "graph", "walk", graph, "--seconds", 5, "--no-video", "--json", "--out", tmp_path / "out"
+    )
+    assert walked.exit_code == 0, walked.stderr
+    assert json.loads(walked.stdout)["happened"]["foot_skate_m"]["median"] < 0.01
+
+
+@pytest.mark.mocap
+def test_over_rough_terrain(dynresp: Command, tmp_path: Path, motions_folder: Path) -> None:
+    graph = tmp_path / "graph.npz"
+    dynresp("graph", "build", "terrain", "--out", graph, "--motions", motions_folder)
+    words = ("graph", "sketch", graph, "--no-video", "--json", "--out", tmp_path / "out")
+    content = json.loads(dynresp(*words, "--seed", 3).stdout)
+    assert content["terrain"]["arrived"]
+    assert content["terrain"]["feet_off_height_worst_m"] < 0.01
+    beside = dynresp(*words, "--goal", "50,50")
+    assert beside.exit_code == 2
+    assert "inside the grid" in beside.stderr
+    assert dynresp(*words, "--maze").exit_code == 2
+
+
+def test_the_step_stool(dynresp: Command, tmp_path: Path) -> None:
+    graph, out = tmp_path / "graph.npz", tmp_path / "out"
+    assert dynresp("graph", "build", "stool", "--out", graph).exit_code == 0
+    result = dynresp(
+        "graph", "walk", graph, "--choices", "1,2", "--no-video", "--json", "--out", out
+    )
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["graph"]["coordinates"] == "fixed"
