@@ -21,6 +21,7 @@ from dynresp.motion.library import default_library
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball
+from dynresp.response.dynamic import Event as Happening
 from dynresp.response.dynamic import EventKind, Flight
 from dynresp.response.dynamic import Phase as Driven
 from dynresp.response.response import CARRY_ON, ResponseConfig
@@ -85,10 +86,11 @@ def hit_outing(
         watcher.look()
     poses = np.array(watcher.poses)
     contacts = foot_contacts(character, character.kinematics(poses), fps)
-    returns = [
+    returns = [  # the last hundred
         {
             "after": back.after,
-            "left_s": None if back.moment is None else back.moment / fps,
+            # The first frame that is shown is frame 1 of the clock.
+            "left_s": None if back.moment is None else (back.moment - 1) / fps,
             "distance": None if back.way is None else back.way.distance,
         }
         for back in avatar.returns
@@ -127,17 +129,18 @@ class _Watcher:
         self._fps = avatar.responder.physics.fps
         self._driven: list[PhaseName] = []
         self._flights: list[Flight] = []
-        self._told = 0
+        self._last: Happening | None = None
 
     def look(self) -> None:
         """Note the frame that is shown now."""
         responder = self._responder
         self.poses.append(responder.pose)
-        for event in list(responder.events)[self._told :]:
+        fresh = itertools.takewhile(lambda e: e is not self._last, reversed(responder.events))
+        for event in reversed(list(fresh)):
+            self._last = event
             if event.kind in _NAMES:
                 # The first frame that is shown is frame 1 of the clock.
                 self.events.append(Event(_NAMES[event.kind], max(event.frame - 1, 0) / self._fps))
-        self._told = len(responder.events)
         flight = responder.flight
         if flight is not None and (not self._flights or self._flights[-1] is not flight):
             self._flights.append(flight)

@@ -123,7 +123,7 @@ class EntryIndex:
 
         for state in range(_FEET + 1):
             look_up(np.flatnonzero(standing == state), state)
-        same = distances <= farthest
+        same = np.isfinite(distances) & (distances <= farthest)
         look_up(np.flatnonzero(~same), _FEET + 1)
         return Nearest(self.frames[places], distances, same)
 

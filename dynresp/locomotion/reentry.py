@@ -121,26 +121,26 @@ class ReentryPlanner:
             costs = seen.distances + config.waiting * times
             costs += np.where(seen.same_contacts, 0.0, config.other_feet)
             moment = first + int(np.argmin(costs[first:]))
-            return self._way(seen, moment, np.zeros(0, np.int32))
+            return self._way(seen, moment, moment, np.zeros(0, np.int32))
         if self._ups is None:
             return None
-        seen = self._ups.nearest(poses, velocities, contacts, config.farthest_lying)
-        moment = len(poses) - 1
-        if seen.distances[moment] > config.farthest_lying:
+        last = self._ups.nearest(poses[-1:], velocities[-1:], contacts[-1:], config.farthest_lying)
+        if last.distances[0] > config.farthest_lying:
             return None
-        frame = int(seen.frames[moment])
+        frame = int(last.frames[0])
         leave = int(self._leave[frame])
         detour = np.arange(frame + 1, leave + 2, dtype=np.int32)
         detour[-1] = self._enter[frame]
-        return self._way(seen, moment, detour)
+        return self._way(last, 0, len(poses) - 1, detour)
 
     @staticmethod
-    def _way(seen: Nearest, moment: int, detour: IntArray) -> WayBack:
+    def _way(seen: Nearest, row: int, moment: int, detour: IntArray) -> WayBack:
+        """The way back of a row of what was looked up, which is a moment."""
         return WayBack(
             moment,
-            int(seen.frames[moment]),
-            float(seen.distances[moment]),
-            bool(seen.same_contacts[moment]),
+            int(seen.frames[row]),
+            float(seen.distances[row]),
+            bool(seen.same_contacts[row]),
             detour,
         )
 

@@ -20,7 +20,7 @@ class ContactCase(IntEnum):
         BEFORE: Begun before the blend, ended in it.
         AFTER: Begun in the blend, ended after it.
         INSIDE: All in the blend.
-        ACROSS: It lasts for the whole blend: nowhere can it pass from the one motion's place to
+        ACROSS: Begun before the blend, it lasts for all of it: nowhere can it pass from the one motion's place to
             the other's. `foot_fitting` keeps it in the one's until the foot is lifted; a graph may
             rather drop the transition.
     """
@@ -63,9 +63,9 @@ def contact_cases(
         stop = np.where(flags[targets], until[targets], after[targets])
         lasts = stop > last
         case = np.where(lasts, ContactCase.AFTER, ContactCase.INSIDE)
-        at_once = flags[targets]
-        case = np.where(at_once & lasts, ContactCase.ACROSS, case)
-        case = np.where(at_once & ~lasts & flags[sources], ContactCase.BEFORE, case)
+        held = flags[targets] & flags[sources]
+        case = np.where(held & lasts, ContactCase.ACROSS, case)
+        case = np.where(held & ~lasts, ContactCase.BEFORE, case)
         cases[:, column] = np.where(meets, case, ContactCase.NONE)
     return cases
 

@@ -63,8 +63,8 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
     axes.set_ylabel("y [m]", fontsize=8, color=_FAINT_INK)
     if corners:
         # The higher a block the darker.
-        highest = max(block.top for block in story.blocks)
-        shades = [mix(BLOCK_COLOR, (0, 0, 0), 0.4 * b.top / highest) for b in story.blocks]
+        highest = max(1e-6, *(block.top for block in story.blocks))
+        shades = [mix(BLOCK_COLOR, (0, 0, 0), 0.4 * max(b.top, 0.0) / highest) for b in story.blocks]
         patches = PatchCollection([Polygon(c) for c in corners], facecolors=shades)
         patches.set_edgecolor((1.0, 1.0, 1.0, 0.5))
         patches.set_linewidth(0.4)

@@ -23,11 +23,9 @@ def _twin(
         while stop + 1 < end and flags[stop + 1]:
             stop += 1
         lasts = stop >= last
-        if begin > target:
+        if begin > target or not flags[source]:
             return ContactCase.AFTER if lasts else ContactCase.INSIDE
-        if lasts:
-            return ContactCase.ACROSS
-        return ContactCase.BEFORE if flags[source] else ContactCase.INSIDE
+        return ContactCase.ACROSS if lasts else ContactCase.BEFORE
     return ContactCase.NONE
 
 
