@@ -160,9 +160,9 @@ def picker(answers: list[int] | None) -> Pick:
                 raise Enough from None
             if typed.strip().lower() == "q":
                 raise Enough
-            answer = next((n for n in range(len(words) + 1) if typed.strip() == str(n)), None)
-            if answer is not None:
-                return answer - 1 if answer else None
+            number = next((n for n in range(len(words) + 1) if typed.strip() == str(n)), None)
+            if number is not None:
+                return number - 1 if number else None
             typer.echo(f"expected a number from 0 to {len(words)}, or q", err=True)
 
     return pick

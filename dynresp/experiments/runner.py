@@ -22,10 +22,11 @@ from dynresp.experiments.folder import (
 )
 from dynresp.experiments.hits import Hit, draw_hits
 from dynresp.experiments.motions import Taken, about_library, take_library, take_motion
-from dynresp.experiments.report import Progress, write_response
+from dynresp.experiments.report import write_response
 from dynresp.experiments.result import versions, write_json
 from dynresp.experiments.settings import in_force, response_config
 from dynresp.experiments.spec import Experiment, StrikerCut, StrikeTable
+from dynresp.experiments.story_files import Progress
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.sources import motion_folders

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dynresp.errors import MotionError
 from dynresp.locomotion.database import BoolArray, IntArray
 from dynresp.locomotion.graph import MotionGraph, between
-from dynresp.locomotion.placement import IDENTITY, of_poses, place_poses
+from dynresp.locomotion.placement import IDENTITY, of_poses, place_poses, place_velocities
 from dynresp.motion.rotations import FloatArray
 
 
@@ -31,6 +31,7 @@ class Played:
         jumps: (k,) whether a frame was reached by a jump.
         placements: (k, 4) where the clip of each frame was put: its recorded pose, placed there, is
             what was displaced.
+        velocities: (k, 45) how the poses move, to first order in what they are displaced by.
     """
 
     frames: IntArray
@@ -38,6 +39,7 @@ class Played:
     contacts: BoolArray
     jumps: BoolArray
     placements: FloatArray
+    velocities: FloatArray
 
 
 class Playback:
@@ -109,20 +111,38 @@ class Playback:
             frame = int(entered[np.argmax(jumps & first)])
             raise MotionError(f"no jump can lead to frame {frame}, the first of its clip")
         moves = self.graph.placement_between(left, entered)
-        poses, placements = np.empty((len(entered), 59)), np.empty((len(entered), 4))
+        count = len(entered)
+        poses, placements = np.empty((count, 59)), np.empty((count, 4))
+        moving = np.empty((count, 45))
         play_kernel(
             database.poses, database.velocities, path, jumps, moves, database.fps, config.blend_s,
             config.blend_rate_s,
             self.place, self._offset, self._rate, self._age, poses, placements,
+            moving,
         )  # fmt: skip
         self.frame = int(path[-1])
-        return Played(entered, poses, database.contacts[entered], jumps, placements)
+        return Played(entered, poses, database.contacts[entered], jumps, placements, moving)
 
 
-def recorded_steps(
-    graph: MotionGraph, before: int, played: Played
-) -> tuple[FloatArray, FloatArray]:
-    """The recorded poses between which each played frame was reached, placed, nothing blended.
+@dataclass(frozen=True, eq=False)
+class RecordedSteps:
+    """The recorded poses between which played frames were reached: placed, nothing blended.
+
+    Attributes:
+        starts: (k, 59) where each step begins.
+        ends: (k, 59) where it ends.
+        moving_starts: (k, 45) how it moves at its beginning.
+        moving_ends: (k, 45) and at its end.
+    """
+
+    starts: FloatArray
+    ends: FloatArray
+    moving_starts: FloatArray
+    moving_ends: FloatArray
+
+
+def recorded_steps(graph: MotionGraph, before: int, played: Played) -> RecordedSteps:
+    """What was recorded of what was played.
 
     A frame that was jumped to comes from the one recorded before it, which is laid over the frame
     left.
@@ -131,12 +151,13 @@ def recorded_steps(
         graph: Whose frames.
         before: The frame played before the first.
         played: What was played.
-
-    Returns:
-        (k, 59) where each step begins, and (k, 59) where it ends.
     """
-    poses, entered = graph.database.poses, played.frames
+    database, entered, places = graph.database, played.frames, played.placements
     left = np.concatenate([[before], entered[:-1]])
     left = np.where(played.jumps, entered - 1, left)
-    starts = place_poses(poses[left], played.placements)
-    return starts, place_poses(poses[entered], played.placements)
+    return RecordedSteps(
+        place_poses(database.poses[left], places),
+        place_poses(database.poses[entered], places),
+        place_velocities(database.velocities[left], places),
+        place_velocities(database.velocities[entered], places),
+    )

@@ -21,7 +21,7 @@ _STATE = types.float64[::1]
 _DISPLACE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _STATE, _STATE)
 _PLAY = types.void(
     _ROWS, _ROWS, _FRAMES, _FLAGS, _ROWS, types.float64, types.float64, types.float64,
-    _STATE, _STATE, _STATE, _STATE, _OUT, _OUT,
+    _STATE, _STATE, _STATE, _STATE, _OUT, _OUT, _OUT,
 )  # fmt: skip
 
 
@@ -113,6 +113,16 @@ def _put(pose, place, offset, out):  # type: ignore[no-untyped-def]
 
 
 @njit
+def _carry_on(velocity, place, rate, out):  # type: ignore[no-untyped-def]
+    """How a recorded frame moves that is placed and displaced, to first order."""
+    cosine, sine = math.cos(place[3]), math.sin(place[3])
+    out[0] = cosine * velocity[0] - sine * velocity[1] + rate[0]
+    out[1] = sine * velocity[0] + cosine * velocity[1] + rate[1]
+    for i in range(2, 45):
+        out[i] = velocity[i] + rate[i]
+
+
+@njit
 def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):  # type: ignore[no-untyped-def]
     """What to displace a placed frame by, for it to be a pose that moves with a velocity."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
@@ -155,7 +165,7 @@ def displacement_kernel(  # type: ignore[no-untyped-def]
 @compiled(_PLAY)
 def play_kernel(  # type: ignore[no-untyped-def]
     poses, velocities, frames, jumps, moves, fps, blend_s, rate_s,
-    place, offset, rate, age, played, placements,
+    place, offset, rate, age, played, placements, moving,
 ):  # fmt: skip
     """Write the poses of a walk; the state goes on from one call to the next.
 
@@ -174,6 +184,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
         age: In and out, (1,) time since then [s].
         played: Out, (k, 59).
         placements: Out, (k, 4) where the clip of each frame was put.
+        moving: Out, (k, 45) how each pose moves, to first order in its displacement.
     """
     pose, velocity = np.empty(59), np.empty(45)
     now, its_rate = np.empty(45), np.empty(45)
@@ -186,12 +197,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
             now[:], its_rate[:] = offset, rate
             _decay(now, its_rate, age[0], blend_s, rate_s)
             _put(poses[left], place, now, pose)
-            cosine, sine = math.cos(place[3]), math.sin(place[3])
-            v = velocities[left]
-            velocity[0] = cosine * v[0] - sine * v[1] + its_rate[0]
-            velocity[1] = sine * v[0] + cosine * v[1] + its_rate[1]
-            for i in range(2, 45):
-                velocity[i] = v[i] + its_rate[i]
+            _carry_on(velocities[left], place, its_rate, velocity)
             _move(place, moves[k, 0], moves[k, 1], moves[k, 2], moves[k, 3])
             _displace(pose, velocity, place, poses[frame - 1], velocities[frame - 1], offset, rate)
             age[0] = 0.0
@@ -200,7 +206,8 @@ def play_kernel(  # type: ignore[no-untyped-def]
             now[:], its_rate[:] = offset, rate
             _decay(now, its_rate, age[0], blend_s, rate_s)
         else:
-            now[:] = 0.0
+            now[:], its_rate[:] = 0.0, 0.0
         _put(poses[frame], place, now, played[k])
+        _carry_on(velocities[frame], place, its_rate, moving[k])
         for i in range(4):
             placements[k, i] = place[i]

@@ -14,7 +14,7 @@ from dynresp.locomotion.graph import MotionGraph
 from dynresp.locomotion.placement import IDENTITY
 from dynresp.motion.character import Character
 from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
-from dynresp.motion.motion import Motion, interpolate
+from dynresp.motion.motion import Motion, interpolate_moving
 from dynresp.motion.rotations import FloatArray
 
 # A frame so near to a knot is on it, as part of the way between two.
@@ -66,12 +66,20 @@ def compose(
     start = np.array(place, dtype=np.float64)
     played = playback.play(path[1:])
     database = graph.database
-    starts, ends = recorded_steps(graph, int(path[0]), played)
+    steps = recorded_steps(graph, int(path[0]), played)
     first = placement.place_poses(database.poses[path[:1]], start)
     knots = np.concatenate([first, played.poses])
+    moving = placement.place_velocities(database.velocities[path[:1]], start)
+    moving = np.concatenate([moving, played.velocities])
     step, part = at_rate(len(path), graph.config.fps, fps)
-    poses = interpolate(knots[step], knots[step + 1], part)
-    source = interpolate(starts[step], ends[step], part)
+    seconds = 1.0 / graph.config.fps
+    poses = interpolate_moving(
+        knots[step], knots[step + 1], moving[step], moving[step + 1], part, seconds
+    )
+    source = interpolate_moving(
+        steps.starts[step], steps.ends[step], steps.moving_starts[step], steps.moving_ends[step],
+        part, seconds,
+    )  # fmt: skip
     contacts = standing(database.contacts[path, :2], step, part)
     jumps = np.flatnonzero(played.jumps) + 1
     # The first frame of the motion after the frame left.

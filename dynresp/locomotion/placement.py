@@ -60,6 +60,14 @@ def place_poses(poses: FloatArray, placements: npt.ArrayLike) -> FloatArray:
     return placed
 
 
+def place_velocities(velocities: FloatArray, placements: npt.ArrayLike) -> FloatArray:
+    """Rows of `qvel` (n, 45) of placed poses: the root's linear velocity turns with them."""
+    at = np.broadcast_to(np.asarray(placements, dtype=np.float64), (len(velocities), 4))
+    placed = np.array(velocities)
+    placed[:, ROOT] = rotations.rotate(rotations.from_yaw(at[:, 3]), velocities[:, ROOT])
+    return placed
+
+
 def wrapped(angle: npt.ArrayLike) -> FloatArray:
     """Angles [rad] brought into (-pi, pi]."""
     a = np.asarray(angle, dtype=np.float64)

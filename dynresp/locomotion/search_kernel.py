@@ -172,7 +172,7 @@ def _plays_free(  # type: ignore[no-untyped-def]
     play_kernel(
         poses, velocities, frames, jumps, moves, 1.0 / settings[FRAME_TIME], settings[BLEND],
         settings[BLEND_RATE], playing[PLACE:OFFSET], playing[OFFSET:RATE], playing[RATE:AGE],
-        playing[AGE:PLAYED], played, placements,
+        playing[AGE:PLAYED], played, placements, np.empty((count, 45)),
     )  # fmt: skip
     states = (1, len(body[0]))
     positions, centers = np.empty((*states, 3)), np.empty((*states, 3))

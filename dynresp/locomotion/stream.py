@@ -12,7 +12,7 @@ from dynresp.locomotion.database import BoolArray
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.motion.character import Character
 from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
-from dynresp.motion.motion import interpolate, pose_velocities
+from dynresp.motion.motion import interpolate_moving, pose_velocities
 from dynresp.motion.rotations import FloatArray
 
 # What was shown is kept as long as it may tell where a foot stands [s].
@@ -45,7 +45,7 @@ class Stream:
         Args:
             graph: Whose frames.
             character: The character.
-            fps: Rate of the clock [1/s].
+            fps: Rate of the clock [1/s], at least the graph's.
             frame: A frame of the graph's database that resembles the last of the poses; what was
                 recorded after it goes on.
             first: The frame of the clock at which the first of the poses is due.
@@ -67,7 +67,7 @@ class Stream:
         # Where the last frame of the graph is on the clock, in frames; as played, as recorded and
         # placed, and what touches.
         self._at = float(self.end - 1)
-        self._pose = self._poses[-1]
+        self._pose, self._moving = self._poses[-1], np.array(velocity)
         recorded = graph.database.poses[frame : frame + 1]
         self._recorded = placement.place_poses(recorded, self._playback.place)[0]
         self._touching = self._contacts[-1]
@@ -89,9 +89,11 @@ class Stream:
         database, before = self.graph.database, self._playback.frame
         played = self._playback.play(frames)
         entered, count = played.frames, len(played.frames)
-        starts, ends = recorded_steps(self.graph, before, played)
+        steps = recorded_steps(self.graph, before, played)
+        starts, ends = steps.starts, steps.ends
         starts[0] = starts[0] if played.jumps[0] else self._recorded
         knots = np.concatenate([self._pose[None], played.poses])
+        moving = np.concatenate([self._moving[None], played.velocities])
         touching = np.concatenate([self._touching[None], played.contacts[:, :2]])
         ratio = self._fps / database.fps
         at = self._at + ratio * np.arange(count + 1)
@@ -99,8 +101,16 @@ class Stream:
         step = np.ceil((clock - at[0]) / ratio - 1e-9).astype(np.intp) - 1
         step = np.clip(step, 0, count - 1)
         part = np.clip((clock - at[step]) / ratio, 0.0, 1.0)
-        self._poses = np.concatenate([self._poses, interpolate(knots[step], knots[step + 1], part)])
-        self._source = np.concatenate([self._source, interpolate(starts[step], ends[step], part)])
+        seconds = 1.0 / database.fps
+        poses = interpolate_moving(
+            knots[step], knots[step + 1], moving[step], moving[step + 1], part, seconds
+        )
+        source = interpolate_moving(
+            starts[step], ends[step], steps.moving_starts[step], steps.moving_ends[step], part,
+            seconds,
+        )  # fmt: skip
+        self._poses = np.concatenate([self._poses, poses])
+        self._source = np.concatenate([self._source, source])
         self._contacts = np.concatenate([self._contacts, standing(touching, step, part)])
         jumped = clock[np.searchsorted(step, np.flatnonzero(played.jumps)).clip(0, len(clock) - 1)]
         self._jumps += [int(frame) for frame in np.unique(jumped) if frame > self._jumps[-1]]
@@ -109,6 +119,7 @@ class Stream:
         self._marks += list(zip(due[exact].tolist(), entered[exact].tolist(), strict=True))
         self.end = self.end + len(clock)
         self._at, self._pose, self._recorded = float(at[-1]), knots[-1], ends[-1]
+        self._moving = moving[-1]
         self._touching = touching[-1]
 
     def fitted(self, now: int) -> tuple[int, FloatArray]:

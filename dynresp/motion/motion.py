@@ -258,6 +258,51 @@ def interpolate(a: FloatArray, b: FloatArray, t: npt.ArrayLike) -> FloatArray:
     return out
 
 
+def interpolate_moving(
+    a: FloatArray,
+    b: FloatArray,
+    moving_a: FloatArray,
+    moving_b: FloatArray,
+    t: npt.ArrayLike,
+    seconds: float,
+) -> FloatArray:
+    """Poses between a and b that begin and end with given velocities: cubics.
+
+    Where poses are far apart in time, straight lines and slerp would gather all changes of speed in
+    them. Rotations go along cubics of rotation vectors from a, whose slope at b is the angular
+    velocity to first order in how far they turn.
+
+    Args:
+        a: Poses at t = 0, (frames, 59).
+        b: Poses at t = 1, as many.
+        moving_a: Rows of `qvel` (frames, 45) at a; see `Motion.velocities`.
+        moving_b: Those at b.
+        t: (frames,) or a number, 0 to 1.
+        seconds: Time from a to b [s].
+    """
+    s = np.broadcast_to(np.asarray(t, dtype=np.float64), (len(a),))[:, None]
+    rise = (3.0 - 2.0 * s) * s * s
+    begin, end = ((s - 2.0) * s + 1.0) * s * seconds, (s - 1.0) * s * s * seconds
+    out = np.empty_like(a)
+    out[:, ROOT] = (
+        a[:, ROOT]
+        + rise * (b[:, ROOT] - a[:, ROOT])
+        + begin * moving_a[:, ROOT]
+        + end * moving_b[:, ROOT]
+    )
+    qa, qb = (x[:, 3:].reshape(len(a), -1, 4) for x in (a, b))
+    turn = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(qa), qb))
+    rates = begin[..., None] * moving_a[:, 3:].reshape(turn.shape)
+    rates += end[..., None] * moving_b[:, 3:].reshape(turn.shape)
+    way = rotations.from_rotation_vector(rise[..., None] * turn + rates)
+    # Exactly a and b at the two ends.
+    met = rotations.multiply(qa, way)
+    met = np.where(s[..., None] >= 1.0, qb, met)
+    out[:, 3:] = met.reshape(len(a), -1)
+    out[:, ROOT] = np.where(s >= 1.0, b[:, ROOT], out[:, ROOT])
+    return out
+
+
 def pose_velocities(poses: FloatArray, fps: float) -> FloatArray:
     """Rows of `qvel` (frames, 45) by central differences; see `Motion.velocities`."""
     frames = len(poses)

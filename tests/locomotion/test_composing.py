@@ -11,7 +11,8 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import angle_between
 from dynresp.motion.skating import foot_skates
-from tests.locomotion.samples import walking_graph
+from dynresp.response.quality import joint_speed_steps
+from tests.locomotion.samples import walking_graph, walking_motions
 
 BLEND = 4
 """Frames of the graph's blends."""
@@ -90,13 +91,25 @@ def test_a_walk_of_no_jumps_is_the_recording(
     made = compose(graph, character, np.arange(clip.start, clip.stop), fps=fps)
     recorded = graph.database.motion(1)
     assert len(made.jumps) == 0
-    shift, turn = differences(made.sliding, recorded.resampled(fps).poses)
+    shift, turn = differences(made.sliding[:: round(fps / 15.0)], recorded.poses)
     assert shift < 1e-9
     assert turn < 1e-6
+    # Between the graph's frames it is nearer to the recording than slerp, and does not jerk.
+    if fps > 15.0:
+        whole = walking_motions(character)[1].resampled(fps)
+        count = min(len(whole), len(made.sliding))
+        line = recorded.resampled(fps).poses[:count]
+        by_cubics, by_lines = (
+            differences(poses[:count], whole.poses[:count])[1] for poses in (made.sliding, line)
+        )
+        assert by_cubics < by_lines
+        steps = joint_speed_steps(Motion(made.sliding, fps))
+        theirs = joint_speed_steps(whole)
+        assert np.percentile(steps, 99) < 1.2 * np.percentile(theirs, 99)
     # The feet of this one do not slide: hardly anything is to be fitted, at any rate.
     shift, turn = differences(made.motion.poses, made.sliding)
-    assert shift < 1e-3
-    assert turn < np.radians(2.0)
+    assert shift < 6e-3
+    assert turn < np.radians(8.0)
 
 
 @pytest.mark.parametrize("fps", RATES)

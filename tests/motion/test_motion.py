@@ -8,8 +8,15 @@ from hypothesis import strategies as st
 
 from dynresp.errors import MotionError
 from dynresp.motion import rotations
+from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
-from dynresp.motion.motion import Label, Motion, move_poses, pose_velocities
+from dynresp.motion.motion import (
+    Label,
+    Motion,
+    interpolate_moving,
+    move_poses,
+    pose_velocities,
+)
 from tests.motion.samples import random_poses, smooth_motion
 from tests.oracles import kinematics as slow
 from tests.oracles.quaternions import matrix
@@ -282,3 +289,45 @@ class TestPlacing:
     def test_frames_that_are_not_there(self, frame: int) -> None:
         with pytest.raises(MotionError, match="it has frames 0 to 19"):
             counting(20).placed(frame=frame)
+
+
+class TestInterpolateMoving:
+    @given(st.integers(0, 10_000))
+    def test_begins_and_ends_as_told(self, seed: int) -> None:
+        motion = smooth_motion(np.random.default_rng(seed), 12)
+        a, b = motion.poses[3:4], motion.poses[4:5]
+        moving = motion.velocities()
+        seconds, tick = 1.0 / motion.fps, 1e-4
+        times = np.array([0.0, tick, 1.0 - tick, 1.0])
+        poses = interpolate_moving(
+            np.repeat(a, 4, axis=0), np.repeat(b, 4, axis=0), np.repeat(moving[3:4], 4, axis=0),
+            np.repeat(moving[4:5], 4, axis=0), times, seconds,
+        )  # fmt: skip
+        np.testing.assert_allclose(poses[0, ROOT], a[0, ROOT], atol=1e-12)
+        np.testing.assert_array_equal(poses[3], b[0])
+        for first, wanted in ((0, moving[3]), (2, moving[4])):
+            found = pose_velocities(poses[first : first + 2], 1.0 / (tick * seconds))[0]
+            np.testing.assert_allclose(found[:3], wanted[:3], atol=2e-2)
+            # Angular velocities at b hold to first order in how far a joint turns.
+            np.testing.assert_allclose(
+                found[3:], wanted[3:], atol=0.05 + 0.1 * abs(wanted[3:]).max()
+            )
+
+    def test_is_nearer_to_a_person_than_slerp(self, character: Character) -> None:
+        fine = load_builtin("walk", character).resampled(60.0)
+        coarse = fine.resampled(15.0)
+        step, part = np.divmod(np.arange(4 * (len(coarse) - 1)), 4)
+        moving = coarse.velocities()
+        smooth = interpolate_moving(
+            coarse.poses[step], coarse.poses[step + 1], moving[step], moving[step + 1],
+            part / 4.0, 1.0 / 15.0,
+        )  # fmt: skip
+        straight = coarse.resampled(60.0).poses
+        errors = [
+            rotations.angle_between(
+                poses[8 : len(smooth) - 8, 3:].reshape(-1, 14, 4),
+                fine.poses[8 : len(smooth) - 8, 3:].reshape(-1, 14, 4),
+            ).mean()
+            for poses in (smooth, straight)
+        ]
+        assert errors[0] < 0.8 * errors[1]
