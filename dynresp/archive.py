@@ -39,6 +39,8 @@ _NPY_HEADER = re.compile(
     rb"'shape': \(((?:\d{1,12}, )*(?:\d{1,12},?)?)\), \} *\n"
 )
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+# More than the headers of a member take in a file.
+_MEMBER_BYTES = 512
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class ArchiveFormat:
             `TEXT`; a name in a shape stands for a length that the file chooses.
         most: The largest length that each such name stands for.
         max_text: Most characters of a text.
-        max_bytes: Most bytes of a file.
+        max_bytes: Most bytes of a file, and of all that it unpacks to.
     """
 
     what: str
@@ -67,8 +69,8 @@ class ArchiveFormat:
     def read(self, path: Path) -> Arrays:
         """Read all members.
 
-        Whatever the file says, little more memory is taken than the largest valid one needs: sizes
-        are checked before anything is unpacked, and no object is unpickled.
+        Whatever the file says, little more memory is taken than `max_bytes`: sizes are checked
+        before anything is unpacked, and no object is unpickled.
 
         Args:
             path: The file.
@@ -104,7 +106,8 @@ class ArchiveFormat:
             arrays: One for each member but `format_version`; text as arrays of NumPy's text.
 
         Raises:
-            UsageError: As `error` says: an array is not what the format allows.
+            UsageError: As `error` says: an array is not what the format allows, or the file would
+                be too large to be read.
             DynrespError: The file cannot be written.
         """
         whole = {"format_version": np.array(self.version, dtype="<i8"), **arrays}
@@ -112,6 +115,8 @@ class ArchiveFormat:
             problem = self.problem(name, array.dtype.str, array.shape)
             if problem:
                 self.fail(Path(path), problem)
+        if sum(array.nbytes + _MEMBER_BYTES for array in whole.values()) > self.max_bytes:
+            self._fail_as_too_large(Path(path))
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
             for name, array in whole.items():
                 # Stored, since packed bytes depend on the zlib at hand.
@@ -152,11 +157,14 @@ class ArchiveFormat:
             return f"{name} must have the shape ({allowed}), not {shape}"
         return None
 
+    def _fail_as_too_large(self, path: Path) -> NoReturn:
+        self.fail(path, f"is larger than {self.max_bytes / 2**20:g} MiB; cut the {self.what}")
+
     def _check_archive(self, path: Path, file: BinaryIO) -> None:
         """Refuse what is no small zip archive, before the zip library reads its directory."""
         size = file.seek(0, os.SEEK_END)
         if size > self.max_bytes:
-            self.fail(path, f"is larger than {self.max_bytes / 2**20:g} MiB; cut the {self.what}")
+            self._fail_as_too_large(path)
         file.seek(-min(size, _ZIP_END.size + _ZIP64_BYTES), os.SEEK_END)
         tail = file.read()
         if len(tail) < _ZIP_END.size:
@@ -169,6 +177,13 @@ class ArchiveFormat:
 
     def _arrays(self, path: Path, archive: zipfile.ZipFile) -> Arrays:
         """All members, checked one by one."""
+        unpacked = sum(info.file_size for info in archive.infolist())
+        if unpacked > self.max_bytes:
+            self.fail(
+                path,
+                f"unpacks to {unpacked / 2**20:.1f} MiB, where a {self.what} file has at most "
+                f"{self.max_bytes / 2**20:g} MiB; cut the {self.what}",
+            )
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
         if "format_version" not in members:
             self.fail(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from enum import Enum
 
@@ -20,12 +21,17 @@ class Coordinates(Enum):
     """On a grid of blocks: whole blocks along and up, and quarter turns, do not count."""
 
 
+# Rates [1/s] and times of blending [s] outside of these make no motion; the rest must be finite.
+_RANGES = {"fps": (1.0, 240.0), "blend_s": (0.01, 10.0), "blend_rate_s": (0.01, 10.0)}
+_GREATEST = sys.float_info.max
+
+
 @dataclass(frozen=True)
 class GraphConfig:
     """How a motion graph is made.
 
     Attributes:
-        fps: Frame rate of its frames [1/s]; the paper's is 15.
+        fps: Frame rate of its frames, 1 to 240 [1/s]; the paper's is 15.
         mirrored: Whether the mirror image of every motion belongs to it.
         coordinates: In what world frames are compared.
         contact_change: Whether jumps are allowed only where a contact begins or ends, the strict
@@ -40,7 +46,7 @@ class GraphConfig:
         stutter_s: Jumps within a clip that skip or repeat less than this are none [s].
         slip_m: A jump is dropped if a foot stands from before it to beyond its blend (the paper's
             case 4) in places that lie farther than this apart [m].
-        blend_s: Time over which a jump is blended [s]; 1 to 2 in the paper.
+        blend_s: Time over which a jump is blended, 0.01 to 10 [s]; 1 to 2 in the paper.
         blend_rate_s: Time over which the difference in velocity at a jump goes, at most blend_s
             [s]. The paper has one time for both; but a joint that is 3 rad/s faster when it is
             left would go on to swing 25 degrees too far in a blend of 1 s, and a third of it in
@@ -70,17 +76,24 @@ class GraphConfig:
         Raises:
             UsageError: One of them makes no sense.
         """
-        for name in ("fps", "sigma", "blend_s", "blend_rate_s", "block_m", "block_height_m"):
+        # Compared, not asked whether they are finite: that fails on whole numbers beyond a float.
+        for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise UsageError(f"{name} must be above 0, got {value}")
+            if not least <= value <= most:
+                raise UsageError(
+                    f"{name} must be from {least:g} to {most:g}, got {str(value)[:40]}"
+                )
+        for name in ("sigma", "block_m", "block_height_m"):
+            value = getattr(self, name)
+            if not 0 < value <= _GREATEST:
+                raise UsageError(f"{name} must be above 0 and finite, got {str(value)[:40]}")
         for name in ("velocity_weight", "stutter_s", "slip_m"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise UsageError(f"{name} must be 0 or more, got {value}")
+            if not 0 <= value <= _GREATEST:
+                raise UsageError(f"{name} must be 0 or more and finite, got {str(value)[:40]}")
         if not 0 < self.least_probability < 1:
             raise UsageError(
-                f"least_probability must be between 0 and 1, got {self.least_probability}"
+                f"least_probability must be between 0 and 1, got {str(self.least_probability)[:40]}"
             )
         if self.blend_rate_s > self.blend_s:
             raise UsageError(

@@ -39,7 +39,8 @@ from dynresp.errors import DynrespError, GraphFileError
 from dynresp.locomotion.database import Clip, MotionDatabase
 from dynresp.locomotion.graph import MotionGraph, PruningCounts
 from dynresp.locomotion.graph_config import Coordinates, GraphConfig
-from dynresp.motion.character import POSE_SIZE, Character, default_character
+from dynresp.motion.character import POSE_SIZE, ROOT, Character, default_character
+from dynresp.motion.rotations import FloatArray
 
 FORMAT = ArchiveFormat(
     what="graph",
@@ -75,6 +76,20 @@ FORMAT = ArchiveFormat(
     max_bytes=1 << 30,
 )
 """What a graph file holds."""
+
+# As a motion must be; see `dynresp.motion.motion` and `dynresp.motion.readers.npz`.
+_FARTHEST_M = 100_000.0
+_UNIT_LENGTH_TOLERANCE = 1e-6
+# Of a way whose distance is more sigmas than this, no probability is left in a float64.
+_MOST_SIGMAS = 700.0
+
+# What JSON has for the types of `GraphConfig`'s fields, and what it is called.
+_JSON_TYPES: dict[str, tuple[tuple[type, ...], str]] = {
+    "float": ((float, int), "a number"),
+    "bool": ((bool,), "true or false"),
+    "bool | None": ((bool, type(None)), "true, false or null"),
+    "Coordinates": ((str,), "text"),
+}
 
 
 def save_graph(graph: MotionGraph, path: str | Path) -> None:
@@ -118,7 +133,7 @@ def load_graph(path: str | Path, character: Character | None = None) -> MotionGr
         )
     try:
         graph = _graph(arrays)
-    except (DynrespError, KeyError, TypeError, ValueError) as error:
+    except (DynrespError, ValueError) as error:
         FORMAT.fail(path, f"does not hold a graph: {error}")
     if graph_identity(graph) != arrays["identity"].item():
         FORMAT.fail(path, "is not what was written: its hash differs; build the graph again")
@@ -181,12 +196,8 @@ def _graph(arrays: Arrays) -> MotionGraph:
         raise ValueError("contacts are not given for every frame")
     hands = arrays["hands"]
     contacts = np.concatenate([arrays["feet"], hands], axis=1) if len(hands) else arrays["feet"]
-    config = json.loads(arrays["config"].item())
-    if not isinstance(config, dict):
-        raise ValueError("the configuration is no table")
-    config = GraphConfig(**{**config, "coordinates": Coordinates(config["coordinates"])})
-    if not np.isfinite(arrays["poses"]).all():
-        raise ValueError("a pose is not finite")
+    config = _config(arrays["config"].item())
+    _check_poses(arrays["poses"])
     clips = [Clip(*clip) for clip in zip(names, starts, stops, hashes, strict=True)]
     database = MotionDatabase(
         arrays["poses"],
@@ -208,6 +219,9 @@ def _graph(arrays: Arrays) -> MotionGraph:
         raise ValueError("a distance is negative or not finite")
     if len(targets) == 0 or (np.diff(offsets)[targets] == 0).any():
         raise ValueError("a way leads to a frame from which none leads on")
+    filled = np.flatnonzero(np.diff(offsets))
+    if (np.minimum.reduceat(distances, offsets[filled]) > _MOST_SIGMAS * config.sigma).any():
+        raise ValueError("a frame has no way on that has a probability")
     rows = np.repeat(np.arange(frames), np.diff(offsets))
     jumps = database.successors[rows] != targets
     first = np.zeros(frames, dtype=bool)
@@ -221,3 +235,52 @@ def _graph(arrays: Arrays) -> MotionGraph:
         database, config, told, offsets.astype(np.int64), targets.astype(np.int32),
         distances.astype(np.float32),
     )  # fmt: skip
+
+
+def _config(text: str) -> GraphConfig:
+    """The configuration, every key there and of its type.
+
+    Raises:
+        ValueError: It is no such table.
+        UsageError: A number makes no sense.
+    """
+    try:
+        said = json.loads(text)
+    except RecursionError:
+        raise ValueError("the configuration is nested too deeply") from None
+    if not isinstance(said, dict):
+        raise ValueError("the configuration is no table")
+    kinds = {field.name: _JSON_TYPES[str(field.type)] for field in dataclasses.fields(GraphConfig)}
+    if said.keys() != kinds.keys():
+        raise ValueError(f"the configuration must have the keys {', '.join(sorted(kinds))}")
+    for name, (types, what) in kinds.items():
+        # Not isinstance: True is no number.
+        if type(said[name]) not in types:
+            raise ValueError(f"{name} must be {what}, not {type(said[name]).__name__}")
+    return GraphConfig(**{**said, "coordinates": Coordinates(said["coordinates"])})
+
+
+def _check_poses(poses: FloatArray) -> None:
+    """Refuse poses (frames, 59) that no body has.
+
+    Raises:
+        ValueError: A number is not finite, a root is far away, or a quaternion not of unit length.
+    """
+    if not np.isfinite(poses).all():
+        raise ValueError("a pose is not finite")
+    far = (np.abs(poses[:, ROOT]) > _FARTHEST_M).any(axis=1)
+    if far.any():
+        frame = int(np.argmax(far))
+        raise ValueError(
+            f"the root of frame {frame} is at {poses[frame, ROOT].tolist()}; "
+            f"it must be within {_FARTHEST_M:g} m of the origin"
+        )
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(poses[:, 3:].reshape(len(poses), -1, 4), axis=2)
+    wrong = ~(np.abs(lengths - 1.0) <= _UNIT_LENGTH_TOLERANCE)
+    if wrong.any():
+        frame, number = np.unravel_index(np.argmax(wrong), wrong.shape)
+        raise ValueError(
+            f"quaternions must be of unit length; quaternion {number} of frame {frame} has the "
+            f"length {lengths[frame, number]:g}"
+        )

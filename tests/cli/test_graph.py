@@ -184,6 +184,8 @@ class TestSketch:
             (("--points", "0,0"), "two corners or more"),
             (("--points", "0,0 1,nan"), "within 10000 m"),
             (("--path", "none.csv"), "cannot be read"),
+            (("--points", "0,0 600,0 0,0"), "1200 m long; at most 1000 m"),
+            (("--points", "0,0 " * 10_001), "10001 corners; at most 10000"),
             (("--goal", "1,1", "--points", "0,0 1,1"), "give a path"),
             (("--goal", "1;1"), "--goal: expected x,y"),
             (("--maze", "--world", "none.toml"), "no such file"),
@@ -201,6 +203,27 @@ class TestSketch:
         assert result.exit_code == 2, result.output
         assert said in result.stderr
         assert "Traceback" not in result.stderr
+
+    @pytest.mark.parametrize(
+        ("content", "said"),
+        [
+            # The limit of 1 MiB lies inside a character.
+            (b"#" + 2**20 * "é".encode(), "is larger than 1024 KiB"),
+            (b"0,0\n1,1\xc3", "is no text"),
+            (b"0,0\n" + 2**19 * b"9" + b",0", "points must be within 10000 m"),
+            (b"0,0\n0.5,0\n" * 1_001, "1000.5 m long; at most 1000 m"),
+            (b"0,0\n" * 10_001, "10001 corners; at most 10000"),
+        ],
+    )
+    def test_files_that_hold_no_path(
+        self, dynresp: Command, graph: Path, tmp_path: Path, content: bytes, said: str
+    ) -> None:
+        path = tmp_path / "path.csv"
+        path.write_bytes(content)
+        result = dynresp("graph", "sketch", graph, "--out", tmp_path / "out", "--path", path)
+        assert result.exit_code == 2, result.output
+        assert said in " ".join(result.stderr.split())
+        assert len(result.stderr) < 1000
 
 
 @pytest.mark.mocap

@@ -3,7 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.errors import MissingMotionDataError
+from dynresp.errors import MissingMotionDataError, SpecError, UnknownNameError
+from dynresp.graphs import building
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import GraphPlan, find_plan, read_plan
 from dynresp.locomotion.graph_file import graph_identity
@@ -44,6 +45,38 @@ def test_same_motions_same_graph(folder: Path, character: Character) -> None:
     given = build_graph(plan(*names), [folder], folder, character, quiet)
     found = build_graph(plan("walks/*.npz"), [folder], folder, character, quiet)
     assert graph_identity(given) == graph_identity(found)
+
+
+def test_only_the_folder_that_is_named_is_looked_through(
+    folder: Path, character: Character, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "photos" / "old").mkdir(parents=True)
+    looked: list[Path] = []
+    listed = building.list_motion_files
+
+    def watched(where: Path) -> list[Path]:
+        looked.append(where)
+        return listed(where)
+
+    monkeypatch.setattr(building, "list_motion_files", watched)
+    for motions in ([folder], [folder / "photos", folder]):
+        graph = build_graph(
+            plan("walks/walk_*.npz"), motions, folder / "photos", character, quiet
+        )
+        assert len(graph.database.clips) == 4
+        assert looked == [folder / "walks"]
+        looked.clear()
+
+
+@pytest.mark.parametrize("name", ["/walks/*.npz", "../walks/*.npz", "walks/../*.npz"])
+def test_wildcards_stay_inside_their_folder(folder: Path, character: Character, name: str) -> None:
+    with pytest.raises(SpecError, match="not a path inside a motions folder"):
+        build_graph(plan(name), [folder], folder / "walks", character, quiet)
+
+
+def test_built_in_motion_has_no_wildcards(folder: Path, character: Character) -> None:
+    with pytest.raises(UnknownNameError, match="builtin:walk"):
+        build_graph(plan("builtin:w*"), [folder], folder, character, quiet)
 
 
 def test_progress_is_told(folder: Path, character: Character) -> None:

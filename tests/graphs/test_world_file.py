@@ -42,6 +42,9 @@ def test_a_world(tmp_path: Path) -> None:
         ("bounds = [-1, -2, 10, 4.5]", "", "world.bounds is missing"),
         ("[-1, -2, 10, 4.5]", "[-1, -2, 10]", r"world.bounds: expected 4 numbers in brackets"),
         ("[-1, -2, 10, 4.5]", "[5, -2, 1, 4]", "bounds must be"),
+        ("[-1, -2, 10, 4.5]", "[-1e3, -1e3, 1e3, 1e3]", "sides of at most 400 m, got 2000 x 2000"),
+        ("[-1, -2, 10, 4.5]", "[-1e5, -1, 1e5, 1]", "sides of at most 400 m, got 200000 x 2 m"),
+        ("[-1, -2, 10, 4.5]", "[0, 0, 400, 101]", "at most 40000 m2, got 40400 m2; cut"),
         ("[2, 1]", "[2, nan]", "box 1.size: expected 2 numbers"),
         ("[2, 1]", "[2, -1]", "sizes of an obstacle must be above 0"),
         ("size = [0.2, 3]", "sizes = [0.2, 3]", r"sizes is not a key of \[box\]"),
@@ -51,3 +54,11 @@ def test_a_world(tmp_path: Path) -> None:
 def test_mistakes_are_told(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(SpecError, match=said):
         read_world(written(tmp_path, WORLD.replace(old, new, 1)))
+
+
+def test_many_boxes_need_a_small_world(tmp_path: Path) -> None:
+    box = "[[box]]\ncenter = [1, 1]\nsize = [0.1, 0.1]\n"
+    text = "[world]\nbounds = [0, 0, {0}, {0}]\n" + 2000 * box
+    assert len(read_world(written(tmp_path, text.format(20))).obstacles) == 2000
+    with pytest.raises(SpecError, match=r"10000 m2 may have at most 396 boxes, got 2000; leave"):
+        read_world(written(tmp_path, text.format(100)))

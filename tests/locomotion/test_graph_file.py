@@ -1,7 +1,9 @@
 """The file of a graph: exact there and back, and refused where it is damaged."""
 
+import json
 import random
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,14 @@ def rewritten(file: Path, **changes: Any) -> Path:
         arrays = {**dict(archive), **changes}
     np.savez(file, **arrays)
     return file
+
+
+def reconfigured(file: Path, **changes: Any) -> Path:
+    """The file with other values in its configuration; `...` leaves one out."""
+    with np.load(file, allow_pickle=False) as archive:
+        config = {**json.loads(archive["config"].item()), **changes}
+    kept = {name: value for name, value in config.items() if value is not ...}
+    return rewritten(file, config=np.array(json.dumps(kept)))
 
 
 class TestRoundTrip:
@@ -86,6 +96,7 @@ class TestRefuses:
             (lambda a: {"config": np.array("[]")}, "the configuration is no table"),
             (lambda a: {"config": np.array("{}")}, "coordinates"),
             (lambda a: {"config": np.array("{")}, "does not hold a graph"),
+            (lambda a: {"config": np.array("[" * 1990)}, "nested too deeply"),
             (lambda a: {"poses": a["poses"] * np.nan}, "not finite"),
             (lambda a: {"poses": a["poses"].astype("<f4")}, "poses must be of type <f8"),
             (lambda a: {"format_version": np.array(9)}, "format version 9"),
@@ -96,6 +107,58 @@ class TestRefuses:
             changes = change(dict(archive))
         with pytest.raises(GraphFileError, match=said):
             load_graph(rewritten(file, **changes))
+
+    @pytest.mark.parametrize(
+        ("changes", "said"),
+        [
+            ({"fps": 10**400}, "fps must be from 1 to 240"),
+            ({"fps": 10**9}, "fps must be from 1 to 240"),
+            ({"fps": "15"}, "fps must be a number, not str"),
+            ({"fps": True}, "fps must be a number, not bool"),
+            ({"mirrored": "no"}, "mirrored must be true or false, not str"),
+            ({"contact_change": 3}, "contact_change must be true or false, not int"),
+            ({"local_maxima": 0}, "local_maxima must be true, false or null, not int"),
+            ({"coordinates": ["relative"]}, "coordinates must be text, not list"),
+            ({"coordinates": "absolute"}, "'absolute' is not a valid Coordinates"),
+            ({"blend_s": 1e12}, "blend_s must be from 0.01 to 10"),
+            ({"blend_rate_s": 1e-9}, "blend_rate_s must be from 0.01 to 10"),
+            ({"sigma": 10**400}, "sigma must be above 0"),
+            ({"sigma": 1e-300}, "no way on that has a probability"),
+            ({"sigma": None}, "sigma must be a number, not NoneType"),
+            ({"slip_m": float("nan")}, "slip_m must be 0 or more"),
+            ({"stutter_s": float("inf")}, "stutter_s must be 0 or more"),
+            ({"least_probability": "1"}, "least_probability must be a number"),
+            ({"sigma": ...}, "configuration must have the keys .*, sigma,"),
+            ({"sigmas": 1.0}, "configuration must have the keys .*, sigma,"),
+        ],
+    )
+    def test_configurations_that_make_no_sense(
+        self, file: Path, changes: dict[str, Any], said: str
+    ) -> None:
+        with pytest.raises(GraphFileError, match=f"does not hold a graph: .*{said}"):
+            load_graph(reconfigured(file, **changes))
+
+    @pytest.mark.parametrize(
+        ("columns", "value", "said"),
+        [
+            (slice(3, 7), 0.0, "quaternion 0 of frame 5 has the length 0"),
+            (slice(3, 7), 500.0, "quaternion 0 of frame 5 has the length 1000"),
+            (slice(11, 15), 1e200, "quaternion 2 of frame 5 has the length inf"),
+            (slice(11, 15), 0.500001, "quaternion 2 of frame 5 has the length 1"),
+            (0, 1e308, "the root of frame 5 is .* within 100000 m"),
+            (2, -100_001.0, "the root of frame 5 is .* within 100000 m"),
+        ],
+    )
+    def test_poses_that_no_body_has(
+        self, graph: MotionGraph, tmp_path: Path, columns: int | slice, value: float, said: str
+    ) -> None:
+        poses = np.array(graph.database.poses)
+        poses[5, columns] = value
+        # Its hash is right, so only the look at the poses can refuse it.
+        path = tmp_path / "graph.npz"
+        save_graph(replace(graph, database=replace(graph.database, poses=poses)), path)
+        with pytest.raises(GraphFileError, match=f"does not hold a graph: .*{said}"):
+            load_graph(path)
 
     def test_a_motion_file(self, character: Character, tmp_path: Path) -> None:
         from dynresp.motion.export import write_npz

@@ -110,3 +110,39 @@ def test_what_is_no_world() -> None:
         Obstacle((0, 0), (1, 1), height=-1.0)
     with pytest.raises(UsageError, match="bounds must be"):
         World((1.0, 0.0, 0.0, 2.0))
+
+
+def test_a_world_must_not_be_too_large_for_grids() -> None:
+    World((0.0, 0.0, 400.0, 100.0))
+    World((-100.0, -100.0, 100.0, 100.0), (Obstacle((0, 0), (1, 1)),) * 96)
+    with pytest.raises(UsageError, match=r"sides of at most 400 m, got 401 x 1 m; cut"):
+        World((0.0, 0.0, 401.0, 1.0))
+    with pytest.raises(UsageError, match="sides of at most 400 m"):
+        World((-1e308, -1e308, 1e308, 1e308))
+    with pytest.raises(UsageError, match=r"at most 40000 m2, got 160000 m2"):
+        World((0.0, 0.0, 400.0, 400.0))
+    with pytest.raises(UsageError, match=r"may have at most 96 boxes, got 97"):
+        World((-100.0, -100.0, 100.0, 100.0), (Obstacle((0, 0), (1, 1)),) * 97)
+
+
+def test_grids_must_not_be_too_fine() -> None:
+    assert World((0.0, 0.0, 400.0, 100.0)).grid_shape(0.1) == (4000, 1000)
+    assert World((0.0, 0.0, 1.01, 0.05)).grid_shape(0.1) == (11, 1)
+    world = World((0.0, 0.0, 100.0, 100.0), (Obstacle((0, 0), (1, 1)),) * 300)
+    with pytest.raises(UsageError, match=r"100 x 100 m in cells of 0.01 m .* larger cells"):
+        CollisionGrid.of(world, 1.2, cell_m=0.01)
+    with pytest.raises(UsageError, match="larger cells"):
+        world.grid_shape(1e-300)
+    # Not too many cells, but too many for so many boxes.
+    assert World(world.bounds).grid_shape(0.05) == (2000, 2000)
+    with pytest.raises(UsageError, match="304 boxes .* larger cells"):
+        world.grid_shape(0.05)
+    with pytest.raises(UsageError, match="side of cells must be above 0, got 0"):
+        world.grid_shape(0.0)
+
+
+def test_lists_of_boxes_must_not_be_too_long() -> None:
+    # Every box is near to every cell.
+    world = World((0.0, 0.0, 40.0, 40.0), (Obstacle((20, 20), (40, 40)),) * 600)
+    with pytest.raises(UsageError, match=r"boxes that overlap .* reach .* leave out"):
+        CollisionGrid.of(world, 1.2)

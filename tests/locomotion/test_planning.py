@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dynresp.errors import DynrespError, UsageError
+from dynresp.locomotion.worlds import planning
 from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
 from dynresp.locomotion.worlds.planning import PlanningConfig, fit_path, plan_path, resampled
@@ -83,6 +84,27 @@ def test_there_may_be_no_way() -> None:
         fit_path(world, [(0.0, 0.0), (8.0, 0.0)])
     with pytest.raises(DynrespError, match=r"the goal .* is not within 2 m"):
         plan_path(world, (0.0, 0.0), (18.0, 0.0))
+
+
+def test_grids_that_would_be_too_large_are_refused() -> None:
+    world = World((-100.0, -100.0, 100.0, 100.0))
+    fine = PlanningConfig(resolution_m=0.01)
+    with pytest.raises(UsageError, match="200 x 200 m in cells of 0.01 m"):
+        plan_path(world, (0.0, 0.0), (8.0, 0.0), fine)
+    discs = np.zeros((20_000, 3))
+    with pytest.raises(UsageError, match="20005 boxes"):
+        plan_path(WALL, (0.0, 0.0), (8.0, 0.0), PlanningConfig(resolution_m=0.04), discs)
+
+
+def test_what_is_looked_at_around_a_sketch_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    sketch = [(0.0, -1.5), (8.0, -1.5)]
+    # Enough for a first look; the second, four times as wide, gives way to a plan.
+    monkeypatch.setattr(planning, "_MOST_STATES", 20_000)
+    path = fit_path(WALL, sketch)
+    np.testing.assert_allclose(path, plan_path(WALL, *sketch))
+    monkeypatch.setattr(planning, "_MOST_STATES", 2_000)
+    with pytest.raises(UsageError, match=r"8.0 m long is too long .* smaller reach_m"):
+        fit_path(WALL, sketch)
 
 
 def test_points_along_a_path() -> None:

@@ -7,10 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.obstacles import World, box_distance
 from dynresp.motion.rotations import FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
+
+# Most boxes in the lists of all cells: about 1 GB while they are sorted, and far below the 2^31
+# that `CollisionGrid.starts` can count.
+_MOST_MEMBERS = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +55,28 @@ class CollisionGrid:
             reach_m: Bodies cover no ground farther than this from their root [m], margins
                 included.
             cell_m: Side of the grid's cells [m].
+
+        Raises:
+            UsageError: There are too many cells, or too many boxes near to them.
         """
         low = np.array(world.bounds[:2])
-        columns, rows = np.ceil((np.array(world.bounds[2:]) - low) / cell_m).astype(int)
+        columns, rows = world.grid_shape(cell_m)
         x = low[0] + cell_m * (np.arange(columns) + 0.5)
         y = low[1] + cell_m * (np.arange(rows) + 0.5)
         middles = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
         clearance = np.full((columns, rows), np.inf)
-        cells, members = [], []
+        cells, members, count = [], [], 0
         for index, box in enumerate(world.boxes):
             distance = box_distance(middles, box)
             np.minimum(clearance, distance, out=clearance)
             near = np.flatnonzero(distance.ravel() <= reach_m + 0.7072 * cell_m)
+            count += len(near)
+            if count > _MOST_MEMBERS:
+                raise UsageError(
+                    f"too many boxes that overlap or are within reach, {reach_m:g} m, of the same "
+                    f"places: more than {_MOST_MEMBERS} in all cells of {cell_m:g} m; leave out "
+                    "boxes that others cover, or choose larger cells"
+                )
             cells.append(near)
             members.append(np.full(len(near), index, dtype=np.int32))
         all_cells = np.concatenate(cells)

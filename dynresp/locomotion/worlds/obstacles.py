@@ -18,6 +18,15 @@ from dynresp.motion.rotations import FloatArray
 _RIM = 500.0
 # Bodies farther than this from a root in rest [m] belong to no character of human size.
 _REACH = 1.5
+# Grids over a world, and what is worked out in each cell for each box, must fit into memory and
+# time: a plan in cells of 0.1 m over the largest world takes about 1.5 GB and half a minute.
+_MOST_SIDE_M = 400.0
+_MOST_AREA_M2 = 40_000.0
+_MOST_BOX_AREA_M2 = 4e6
+_MOST_CELLS = 5_000_000
+_MOST_BOX_CELLS = 500_000_000
+# The walls of the rim.
+_WALLS = 4
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,9 @@ class World:
         obstacles: The boxes; they may overlap.
 
     Raises:
-        UsageError: The bounds enclose nothing.
+        UsageError: The bounds enclose nothing, or more than 400 m along a side or 40,000 m^2; or
+            there are more boxes than can be planned around: the area times the boxes and the
+            rim's four walls must not exceed 4,000,000 m^2.
     """
 
     bounds: tuple[float, float, float, float]
@@ -73,6 +84,24 @@ class World:
         if not (all(math.isfinite(v) for v in self.bounds) and low_x < high_x and low_y < high_y):
             raise UsageError(
                 f"bounds must be (least x, least y, largest x, largest y), got {self.bounds}"
+            )
+        wide, deep = high_x - low_x, high_y - low_y
+        if max(wide, deep) > _MOST_SIDE_M:
+            raise UsageError(
+                f"bounds must have sides of at most {_MOST_SIDE_M:g} m, got {wide:g} x {deep:g} m; "
+                "cut the world to where the avatar walks"
+            )
+        area = wide * deep
+        if area > _MOST_AREA_M2:
+            raise UsageError(
+                f"bounds must enclose at most {_MOST_AREA_M2:.0f} m2, got {area:.0f} m2; "
+                "cut the world to where the avatar walks"
+            )
+        if area * (len(self.obstacles) + _WALLS) > _MOST_BOX_AREA_M2:
+            raise UsageError(
+                f"a world of {area:.0f} m2 may have at most "
+                f"{int(_MOST_BOX_AREA_M2 / area) - _WALLS} boxes, got {len(self.obstacles)}; "
+                "leave out boxes that the avatar does not come near, or cut the world"
             )
 
     @functools.cached_property
@@ -94,6 +123,30 @@ class World:
         boxes = np.array(rows)
         boxes.flags.writeable = False
         return boxes
+
+    def grid_shape(self, side_m: float, more: int = 0) -> tuple[int, int]:
+        """How many square cells a grid over the bounds has along x and y.
+
+        Args:
+            side_m: Side of the cells [m].
+            more: How many things there are to keep clear of beside the boxes.
+
+        Raises:
+            UsageError: There are too many cells, or too many for so many boxes.
+        """
+        if not side_m > 0:
+            raise UsageError(f"the side of cells must be above 0, got {side_m:g}")
+        low_x, low_y, high_x, high_y = self.bounds
+        size = (high_x - low_x, high_y - low_y)
+        cells = [max(1.0, np.ceil(length / side_m)) for length in size]
+        boxes = len(self.obstacles) + _WALLS + more
+        if not (math.prod(cells) <= _MOST_CELLS and math.prod(cells) * boxes <= _MOST_BOX_CELLS):
+            raise UsageError(
+                f"a world of {size[0]:g} x {size[1]:g} m in cells of {side_m:g} m with {boxes} "
+                f"boxes is too much to lay out: at most {_MOST_CELLS} cells, and {_MOST_BOX_CELLS} "
+                "times a box; choose larger cells or a smaller world, or leave out boxes"
+            )
+        return int(cells[0]), int(cells[1])
 
     def distances(self, points: npt.ArrayLike) -> FloatArray:
         """Distance of points on the ground to the nearest box or rim.

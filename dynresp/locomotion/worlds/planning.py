@@ -18,6 +18,8 @@ _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
 # How often a path is smoothed: by about half a metre when planned, a quarter of one when it is to
 # stay near a sketch.
 _SMOOTHINGS_PLANNED, _SMOOTHINGS_FITTED = 60, 15
+# Most states that are looked at around a sketch, each of a few hundred bytes.
+_MOST_STATES = 3_000_000
 
 
 @dataclass(frozen=True)
@@ -62,8 +64,7 @@ class _Grid:
     def __init__(self, world: World, config: PlanningConfig, blocked: FloatArray) -> None:
         self.config, self.world = config, world
         self.low = np.array(world.bounds[:2])
-        size = np.array(world.bounds[2:]) - self.low
-        self.shape = tuple(np.maximum(1, np.ceil(size / config.resolution_m)).astype(int))
+        self.shape = world.grid_shape(config.resolution_m, len(blocked))
         self.blocked = blocked
         index = np.stack(np.unravel_index(np.arange(self.cells), self.shape), axis=1)
         self.middles = self.low + config.resolution_m * (index + 0.5)
@@ -138,6 +139,7 @@ def plan_path(
         nearest to the goal.
 
     Raises:
+        UsageError: The world has too many cells of `resolution_m`.
         DynrespError: There is no way, or no free ground near the start or the goal.
     """
     from scipy.sparse import csr_array
@@ -184,10 +186,13 @@ def fit_path(
         than is looked around, the path is planned from its start to its end.
 
     Raises:
+        UsageError: The world has too many cells of `resolution_m`, or the sketch is so long that
+            there is too much within `reach_m` of it.
         DynrespError: There is no way, or no free ground near the start or the goal.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
+    from scipy.spatial import cKDTree
 
     config = config or PlanningConfig()
     discs = np.asarray(blocked, dtype=np.float64).reshape(-1, 3)
@@ -195,8 +200,20 @@ def fit_path(
     points = resampled(sketch, 2.0 * config.resolution_m)
     first, last = grid.nearest_free(points[0], "start"), grid.nearest_free(points[-1], "goal")
     a, b, costs = grid.ways()
+    free = np.flatnonzero(grid.free)
+    tree = cKDTree(grid.middles[free])
     for reach in (config.reach_m, 4.0 * config.reach_m):
-        keys, away = _near(grid, points, reach, first, last)
+        states = int(np.sum(tree.query_ball_point(points, reach, return_length=True)))
+        if states > _MOST_STATES:
+            if reach == config.reach_m:
+                raise UsageError(
+                    f"a sketch {_length(points):.1f} m long is too long to look {reach:g} m around "
+                    f"it in cells of {config.resolution_m:g} m; cut it, or choose a smaller "
+                    "reach_m or a larger resolution_m"
+                )
+            break
+        inside = [free[tree.query_ball_point(point, reach)] for point in points]
+        keys, away = _near(grid, points, inside, first, last)
         layer, cell = np.divmod(keys, grid.cells)
         # Along the grid within a layer, at what the places of the layer cost.
         count = np.bincount(cell, minlength=grid.cells)
@@ -263,17 +280,19 @@ def resampled(path: npt.ArrayLike, spacing: float) -> FloatArray:
 
 
 def _near(
-    grid: _Grid, points: FloatArray, reach: float, first: int, last: int
+    grid: _Grid, points: FloatArray, inside: list[IntArray], first: int, last: int
 ) -> tuple[IntArray, FloatArray]:
-    """States within reach of a sketch: layer * cells + cell, ascending; distances to its points."""
-    from scipy.spatial import cKDTree
+    """States around a sketch: layer * cells + cell, ascending; distances to its points.
 
-    free = np.flatnonzero(grid.free)
-    tree = cKDTree(grid.middles[free])
-    inside = [
-        np.append(free[tree.query_ball_point(point, reach)], [first] * (k == 0))
-        for k, point in enumerate(points)
-    ]
+    Args:
+        grid: The cells.
+        points: (k, 2) points of the sketch.
+        inside: For each point the cells within reach.
+        first: The cell of the start, taken in wherever it is.
+        last: The cell of the goal.
+    """
+    inside = [*inside]
+    inside[0] = np.append(inside[0], first)
     inside[-1] = np.append(inside[-1], last)
     keys = np.unique(np.concatenate([k * grid.cells + np.asarray(c) for k, c in enumerate(inside)]))
     layer, cell = np.divmod(keys.astype(np.intp), grid.cells)
