@@ -254,8 +254,9 @@ def keeps_its_feet(
 ) -> BoolArray:
     """Which jumps ask no foot to slip through the whole blend, the paper's case 4 (section 4.1.1).
 
-    A foot that is lifted during the blend is put where it belongs next; one that stands from
-    before the jump to the blend's end can only slip, or stay where it should not.
+    A foot that is lifted during the blend is put where it belongs next; one that stands from the
+    jump to the blend's end, as before or just landed, has no time for that: it can only slip, or
+    stay where it should not.
 
     Args:
         database: The frames.

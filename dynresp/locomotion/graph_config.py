@@ -44,8 +44,8 @@ class GraphConfig:
         local_maxima: Whether of neighbouring jumps only the best stays, the third rule. None
             does what the paper does: not where contact_change already leaves single ones.
         stutter_s: Jumps within a clip that skip or repeat less than this are none [s].
-        slip_m: A jump is dropped if a foot stands from before it to beyond its blend (the paper's
-            case 4) in places that lie farther than this apart [m].
+        slip_m: A jump is dropped if a foot stands from its first frame to the blend's end (the
+            paper's case 4), and would be farther than this from where it was before the jump [m].
         blend_s: Time over which a jump is blended, 0.01 to 10 [s]; 1 to 2 in the paper.
         blend_rate_s: Time over which the difference in velocity at a jump goes, at most blend_s
             [s]. The paper has one time for both; but a joint that is 3 rad/s faster when it is

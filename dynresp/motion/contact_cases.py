@@ -2,6 +2,11 @@
 
 A transition goes from frame i to frame j of a database, and the frames from j to j + b - 1 are
 blended. Told is the first stance of a foot that meets that blend.
+
+A stance that begins with frame j itself, where the foot has just landed, is case 4 as well if it
+outlasts the blend, by the paper's letter. Such a foot could be put where the motion after has it;
+but it lands where the blend is strongest, and walks in which these count as case 2 slide more (5 %
+of all stances by more than 1 cm, instead of 3 %).
 """
 
 from __future__ import annotations
@@ -20,7 +25,7 @@ class ContactCase(IntEnum):
         BEFORE: Begun before the blend, ended in it.
         AFTER: Begun in the blend, ended after it.
         INSIDE: All in the blend.
-        ACROSS: Begun before the blend, it lasts for all of it: nowhere can it pass from the one motion's place to
+        ACROSS: It lasts for the whole blend, begun before or landed with it: nowhere can it pass from the one motion's place to
             the other's. `foot_fitting` keeps it in the one's until the foot is lifted; a graph may
             rather drop the transition.
     """
@@ -63,9 +68,9 @@ def contact_cases(
         stop = np.where(flags[targets], until[targets], after[targets])
         lasts = stop > last
         case = np.where(lasts, ContactCase.AFTER, ContactCase.INSIDE)
-        held = flags[targets] & flags[sources]
-        case = np.where(held & lasts, ContactCase.ACROSS, case)
-        case = np.where(held & ~lasts, ContactCase.BEFORE, case)
+        at_once = flags[targets]
+        case = np.where(at_once & lasts, ContactCase.ACROSS, case)
+        case = np.where(at_once & ~lasts & flags[sources], ContactCase.BEFORE, case)
         cases[:, column] = np.where(meets, case, ContactCase.NONE)
     return cases
 

@@ -23,9 +23,11 @@ def _twin(
         while stop + 1 < end and flags[stop + 1]:
             stop += 1
         lasts = stop >= last
-        if begin > target or not flags[source]:
+        if begin > target:
             return ContactCase.AFTER if lasts else ContactCase.INSIDE
-        return ContactCase.ACROSS if lasts else ContactCase.BEFORE
+        if lasts:
+            return ContactCase.ACROSS
+        return ContactCase.BEFORE if flags[source] else ContactCase.INSIDE
     return ContactCase.NONE
 
 

@@ -149,15 +149,14 @@ def transitions(
 def keeps_its_feet(
     database: MotionDatabase, source: int, target: int, config: GraphConfig, character: Character
 ) -> bool:
-    """Whether no foot that stands from before a blend to its end would slip too far for it."""
+    """Whether no foot that stands through a whole blend would have to slip too far for it."""
     blend = range(target, target + max(1, round(config.blend_s * config.fps)))
     (clip,) = (clip for clip in database.clips if clip.start <= target < clip.stop)
     matched, left = target - 1, database.poses[source]
     laid, _ = laid_over(database.poses[matched], database.velocities[matched], left, config)
     places = character.kinematics(np.stack([left, laid])).positions
     for column, side in enumerate(FEET):
-        through = all(k < clip.stop and database.contacts[k, column] for k in blend)
-        stands = through and database.contacts[source, column]
+        stands = all(k < clip.stop and database.contacts[k, column] for k in blend)
         before, after = places[:, character.body(f"{side}_foot"), :2]
         if stands and np.linalg.norm(after - before) > config.slip_m:
             return False
