@@ -25,9 +25,9 @@ class ContactCase(IntEnum):
         BEFORE: Begun before the blend, ended in it.
         AFTER: Begun in the blend, ended after it.
         INSIDE: All in the blend.
-        ACROSS: It lasts for the whole blend, begun before or landed with it: nowhere can it pass from the one motion's place to
-            the other's. `foot_fitting` keeps it in the one's until the foot is lifted; a graph may
-            rather drop the transition.
+        ACROSS: It lasts for the whole blend, begun before or landed with it: nowhere can it pass
+            from the one motion's place to the other's. `foot_fitting` keeps it in the one's until
+            the foot is lifted; a graph may rather drop the transition.
     """
 
     NONE = 0
