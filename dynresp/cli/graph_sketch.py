@@ -87,35 +87,65 @@ def read_points(text: str | None, file: Path | None) -> FloatArray | None:
     Raises:
         UsageError: Both are given, or one is not what it should be.
     """
-    import numpy as np
-
     from dynresp.errors import UsageError
 
     if text is not None and file is not None:
         raise UsageError("give the path by --points or by --path, not by both")
     if text is not None:
-        return np.array([one_point(word, "--points") for word in text.split()]).reshape(-1, 2)
+        return _corners(text.split(), "--points")
     if file is None:
         return None
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(_MOST_BYTES + 1)
-        lines = data.decode("utf-8").splitlines()
-    except OSError as error:
-        raise UsageError(
-            f"--path: {file} cannot be read ({error.strerror}); expected lines of x, y [m]"
-        ) from None
-    except UnicodeDecodeError:
-        raise UsageError(f"--path: {file} is no text; expected lines of x, y [m]") from None
-    if len(data) > _MOST_BYTES:
-        raise UsageError(f"--path: {file} is larger than {_MOST_BYTES // 1024} KiB; no path is")
-    rows = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    return np.array([one_point(row, f"--path: {file}") for row in rows]).reshape(-1, 2)
+    rows = [line for line in _lines(file) if line.strip() and not line.lstrip().startswith("#")]
+    return _corners(rows, f"--path: {file}")
 
 
 # Largest file of corners that is read [bytes]; and how far corners may be away [m].
 _MOST_BYTES = 1 << 20
 _FARTHEST = 10_000.0
+# Most corners of a path; and how long it may be [m]: to walk a kilometre takes a quarter of an
+# hour, and what is looked at around it between obstacles about 1 GB.
+_MOST_CORNERS = 10_000
+_LONGEST = 1_000.0
+
+
+def _lines(file: Path) -> list[str]:
+    """The lines of a small file of text."""
+    from dynresp.errors import UsageError
+
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(_MOST_BYTES + 1)
+    except OSError as error:
+        raise UsageError(
+            f"--path: {file} cannot be read ({error.strerror}); expected lines of x, y [m]"
+        ) from None
+    # Before it is decoded: what is read of a larger file may end inside a character.
+    if len(data) > _MOST_BYTES:
+        raise UsageError(f"--path: {file} is larger than {_MOST_BYTES // 1024} KiB; no path is")
+    try:
+        return data.decode("utf-8").splitlines()
+    except UnicodeDecodeError:
+        raise UsageError(f"--path: {file} is no text; expected lines of x, y [m]") from None
+
+
+def _corners(words: list[str], where: str) -> FloatArray:
+    """The corners (k, 2) of a path of which each word is one."""
+    import numpy as np
+
+    from dynresp.errors import UsageError
+
+    if len(words) > _MOST_CORNERS:
+        raise UsageError(
+            f"{where}: a path of {len(words)} corners; at most {_MOST_CORNERS} are allowed, so "
+            "leave out corners that lie near to each other"
+        )
+    points = np.array([one_point(word, where) for word in words]).reshape(-1, 2)
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    if length > _LONGEST:
+        raise UsageError(
+            f"{where}: a path {length:g} m long; at most {_LONGEST:g} m are allowed, so cut it"
+        )
+    return points
 
 
 def one_point(text: str, where: str) -> tuple[float, float]:
@@ -132,5 +162,7 @@ def one_point(text: str, where: str) -> tuple[float, float]:
     except ValueError:
         raise UsageError(f"{where}: expected x,y in metres, got {text.strip()[:60]!r}") from None
     if not (abs(x) <= _FARTHEST and abs(y) <= _FARTHEST):
-        raise UsageError(f"{where}: points must be within {_FARTHEST:g} m, got {text.strip()!r}")
+        raise UsageError(
+            f"{where}: points must be within {_FARTHEST:g} m, got {text.strip()[:60]!r}"
+        )
     return x, y

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from pathlib import Path
+from itertools import takewhile
+from pathlib import Path, PurePosixPath
 
 from dynresp.errors import MissingMotionDataError
-from dynresp.experiments.motions import about_cut, find_motion, load_cut
+from dynresp.experiments.motions import BUILTIN_PREFIX, about_cut, find_motion, load_cut
 from dynresp.experiments.spec import MotionCut
 from dynresp.graphs.plan import GraphPlan
 from dynresp.graphs.worlds import lay_out
@@ -16,7 +18,7 @@ from dynresp.locomotion.database import MotionDatabase
 from dynresp.locomotion.graph import MotionGraph
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
-from dynresp.motion.sources import list_motion_files
+from dynresp.motion.sources import checked_relative_path, list_motion_files
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, how many are done, and of how many."""
@@ -44,6 +46,7 @@ def build_graph(
 
     Raises:
         MissingMotionDataError: Motion files are not on this machine.
+        SpecError: A name with wildcards leads out of the folders.
         DynrespError: A file cannot be read, or there is no graph of what it holds.
     """
     spelled = [cut for given in plan.motion for cut in _spelled_out(given, folders, beside)]
@@ -72,15 +75,25 @@ def build_graph(
 
 def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:
     """A table for each file that a name with wildcards stands for; else the table itself."""
-    if not any(sign in given.motion for sign in "*?["):
+    if given.motion.startswith(BUILTIN_PREFIX) or not _has_wildcards(given.motion):
         return [given]
+    # A plan may lie in a home folder: only what the name spells out is looked through.
+    folders_named = PurePosixPath(checked_relative_path(given.motion)).parts[:-1]
+    fixed = list(takewhile(lambda part: not _has_wildcards(part), folders_named))
     for folder in (beside, *folders):
-        files = [file.relative_to(folder).as_posix() for file in list_motion_files(folder)]
+        below = folder.joinpath(*fixed)
+        if not os.path.isdir(below):
+            continue
+        files = [file.relative_to(folder).as_posix() for file in list_motion_files(below)]
         matching = [name for name in files if fnmatchcase(name, given.motion)]
         if matching:
             return [given.model_copy(update={"motion": name}) for name in matching]
     _refuse_missing([given.motion], folders)
     return []
+
+
+def _has_wildcards(name: str) -> bool:
+    return any(sign in name for sign in "*?[")
 
 
 def _refuse_missing(names: list[str], folders: Sequence[Path]) -> None:

@@ -279,7 +279,7 @@ def _check_poses(poses: FloatArray) -> None:
         lengths = np.linalg.norm(poses[:, 3:].reshape(len(poses), -1, 4), axis=2)
     wrong = ~(np.abs(lengths - 1.0) <= _UNIT_LENGTH_TOLERANCE)
     if wrong.any():
-        frame, number = np.unravel_index(np.argmax(wrong), wrong.shape)
+        frame, number = divmod(int(np.argmax(wrong)), wrong.shape[1])
         raise ValueError(
             f"quaternions must be of unit length; quaternion {number} of frame {frame} has the "
             f"length {lengths[frame, number]:g}"

@@ -89,7 +89,7 @@ def test_there_may_be_no_way() -> None:
 def test_grids_that_would_be_too_large_are_refused() -> None:
     world = World((-100.0, -100.0, 100.0, 100.0))
     fine = PlanningConfig(resolution_m=0.01)
-    with pytest.raises(UsageError, match="200 x 200 m in cells of 0.01 m"):
+    with pytest.raises(UsageError, match=r"200 x 200 m in cells of 0.01 m"):
         plan_path(world, (0.0, 0.0), (8.0, 0.0), fine)
     discs = np.zeros((20_000, 3))
     with pytest.raises(UsageError, match="20005 boxes"):
@@ -97,14 +97,14 @@ def test_grids_that_would_be_too_large_are_refused() -> None:
 
 
 def test_what_is_looked_at_around_a_sketch_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    sketch = [(0.0, -1.5), (8.0, -1.5)]
-    # Enough for a first look; the second, four times as wide, gives way to a plan.
+    # Enough for a first look; the second is four times as wide.
     monkeypatch.setattr(planning, "_MOST_STATES", 20_000)
-    path = fit_path(WALL, sketch)
-    np.testing.assert_allclose(path, plan_path(WALL, *sketch))
+    assert WALL.distances(fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])).min() > 0.2
+    with pytest.raises(UsageError, match=r"8\.0 m long is too long to look for ways 4 m around"):
+        fit_path(WALL, [(0.0, -1.5), (8.0, -1.5)])
     monkeypatch.setattr(planning, "_MOST_STATES", 2_000)
-    with pytest.raises(UsageError, match=r"8.0 m long is too long .* smaller reach_m"):
-        fit_path(WALL, sketch)
+    with pytest.raises(UsageError, match=r"too long to look for ways 1 m around .* reach_m"):
+        fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])
 
 
 def test_points_along_a_path() -> None:

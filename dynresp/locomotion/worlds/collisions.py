@@ -73,9 +73,9 @@ class CollisionGrid:
             count += len(near)
             if count > _MOST_MEMBERS:
                 raise UsageError(
-                    f"too many boxes that overlap or are within reach, {reach_m:g} m, of the same "
-                    f"places: more than {_MOST_MEMBERS} in all cells of {cell_m:g} m; leave out "
-                    "boxes that others cover, or choose larger cells"
+                    f"the lists of boxes within reach ({reach_m:g} m) of each cell ({cell_m:g} m) "
+                    f"would hold more than {_MOST_MEMBERS}; leave out boxes that others cover, or "
+                    "choose larger cells"
                 )
             cells.append(near)
             members.append(np.full(len(near), index, dtype=np.int32))

@@ -134,11 +134,12 @@ class World:
         Raises:
             UsageError: There are too many cells, or too many for so many boxes.
         """
-        if not side_m > 0:
-            raise UsageError(f"the side of cells must be above 0, got {side_m:g}")
+        if not 0 < side_m < math.inf:
+            raise UsageError(f"the side of cells must be above 0 and finite, got {side_m:g}")
         low_x, low_y, high_x, high_y = self.bounds
         size = (high_x - low_x, high_y - low_y)
-        cells = [max(1.0, np.ceil(length / side_m)) for length in size]
+        # Floats, which may be infinite here, as whole numbers may not.
+        cells = [max(1.0, float(np.ceil(length / side_m))) for length in size]
         boxes = len(self.obstacles) + _WALLS + more
         if not (math.prod(cells) <= _MOST_CELLS and math.prod(cells) * boxes <= _MOST_BOX_CELLS):
             raise UsageError(

@@ -18,8 +18,9 @@ _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
 # How often a path is smoothed: by about half a metre when planned, a quarter of one when it is to
 # stay near a sketch.
 _SMOOTHINGS_PLANNED, _SMOOTHINGS_FITTED = 60, 15
-# Most states that are looked at around a sketch, each of a few hundred bytes.
-_MOST_STATES = 3_000_000
+# Most states that are looked at around a sketch, each of about 1 kB: those 1 m around 2.5 km, or
+# 4 m around 160 m.
+_MOST_STATES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,8 @@ def fit_path(
 
     Raises:
         UsageError: The world has too many cells of `resolution_m`, or the sketch is so long that
-            there is too much within `reach_m` of it.
+            there is too much to look at within `reach_m` of it, or, where obstacles cut it off,
+            within four times that.
         DynrespError: There is no way, or no free ground near the start or the goal.
     """
     from scipy.sparse import csr_array
@@ -205,13 +207,12 @@ def fit_path(
     for reach in (config.reach_m, 4.0 * config.reach_m):
         states = int(np.sum(tree.query_ball_point(points, reach, return_length=True)))
         if states > _MOST_STATES:
-            if reach == config.reach_m:
-                raise UsageError(
-                    f"a sketch {_length(points):.1f} m long is too long to look {reach:g} m around "
-                    f"it in cells of {config.resolution_m:g} m; cut it, or choose a smaller "
-                    "reach_m or a larger resolution_m"
-                )
-            break
+            length = np.hypot(*np.diff(points, axis=0).T).sum()
+            raise UsageError(
+                f"a sketch {length:.1f} m long is too long to look for ways {reach:g} m around it "
+                f"in cells of {config.resolution_m:g} m; cut it, draw it around the obstacles, or "
+                "choose a smaller reach_m or a larger resolution_m"
+            )
         inside = [free[tree.query_ball_point(point, reach)] for point in points]
         keys, away = _near(grid, points, inside, first, last)
         layer, cell = np.divmod(keys, grid.cells)
