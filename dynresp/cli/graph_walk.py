@@ -160,9 +160,9 @@ def picker(answers: list[int] | None) -> Pick:
                 raise Enough from None
             if typed.strip().lower() == "q":
                 raise Enough
-            number = next((n for n in range(len(words) + 1) if typed.strip() == str(n)), None)
-            if number is not None:
-                return number - 1 if number else None
+            known = next((n for n in range(len(words) + 1) if typed.strip() == str(n)), None)
+            if known is not None:
+                return known - 1 if known else None
             typer.echo(f"expected a number from 0 to {len(words)}, or q", err=True)
 
     return pick

@@ -64,7 +64,8 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
     if corners:
         # The higher a block the darker.
         highest = max(1e-6, *(block.top for block in story.blocks))
-        shades = [mix(BLOCK_COLOR, (0, 0, 0), 0.4 * max(b.top, 0.0) / highest) for b in story.blocks]
+        tops = [max(block.top, 0.0) / highest for block in story.blocks]
+        shades = [mix(BLOCK_COLOR, (0, 0, 0), 0.4 * top) for top in tops]
         patches = PatchCollection([Polygon(c) for c in corners], facecolors=shades)
         patches.set_edgecolor((1.0, 1.0, 1.0, 0.5))
         patches.set_linewidth(0.4)
