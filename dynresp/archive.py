@@ -198,8 +198,12 @@ class ArchiveFormat:
                 "use the dynresp that wrote it, or a newer one",
             )
         if members.keys() != self.members.keys() or len(members) != len(archive.infolist()):
+            missing = {name: None for name in self.members if name not in members}
+            more = {name: None for name in members if name not in self.members}
             self.fail(
-                path, f"must hold {_list(self.members)}, each once, and holds {_list(members)}"
+                path,
+                f"is no {self.what} file, or is damaged: it must hold {len(self.members)} members, "
+                f"each once; missing: {_list(missing)}; unknown: {_list(more)}",
             )
         return {name: self._array(path, archive, members[name], name) for name in self.members}
 

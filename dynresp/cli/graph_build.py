@@ -29,6 +29,7 @@ def build(
 ) -> None:
     """Build a motion graph, and say how many jumps each pruning rule has left."""
     from dynresp.cli.graph_info import tell_graph
+    from dynresp.cli.run import check_file
     from dynresp.errors import MissingMotionDataError
     from dynresp.graphs.building import build_graph
     from dynresp.graphs.plan import find_plan, read_plan
@@ -36,6 +37,7 @@ def build(
     from dynresp.motion.character import default_character
     from dynresp.motion.sources import motion_folders
 
+    check_file(out)
     folders = motion_folders(motions)
     character = default_character()
     with progress() as tell:

@@ -172,7 +172,7 @@ def finish(out: Path, graph: MotionGraph, outing: Outing, video: bool, as_json: 
     """Write an outing and say what came of it.
 
     Raises:
-        typer.Exit: With code 1, where a file could not be written.
+        typer.Exit: With code 1, where it did not arrive, or a file could not be written.
     """
     from dynresp.experiments.folder import WRITTEN, is_failure
     from dynresp.experiments.result import to_json
@@ -185,6 +185,9 @@ def finish(out: Path, graph: MotionGraph, outing: Outing, video: bool, as_json: 
         if what != WRITTEN:
             typer.echo(f"dynresp: {name} {what}", err=True)
     typer.echo(to_json(content) if as_json else tell_outing(content, out))
+    if not outing.arrived:
+        typer.echo("dynresp: it did not arrive; result.json says how far it came", err=True)
+        raise typer.Exit(1)
     if any(is_failure(what) for what in content["files"].values()):
         raise typer.Exit(1)
 
@@ -194,11 +197,13 @@ def tell_outing(content: dict[str, Any], out: Path) -> str:
     happened = content["happened"]
     skate, blended = happened["foot_skate_m"], happened.get("foot_skate_as_blended_m")
     before = f"; as blended {1000 * blended['median']:.0f} mm" if blended else ""
+    jumps = "" if happened["jumps"] is None else f", {happened['jumps']} jumps"
     lines = [
         content["title"],
-        f"  {happened['way_m']:.1f} m in {happened['seconds']:.1f} s, {happened['jumps']} jumps",
+        f"  {happened['way_m']:.1f} m in {happened['seconds']:.1f} s{jumps}",
         f"  feet slide {1000 * skate['median']:.0f} mm a stance (median), "
-        f"{1000 * skate['percentile_95']:.0f} mm at the 95th percentile{before}",
+        f"{1000 * skate['percentile_95']:.0f} mm at the 95th percentile, "
+        f"{1000 * skate['worst']:.0f} mm at most{before}",
     ]
     if content["graph"]["built_in_clips"]:
         lines.append("  made of built-in motion, no motion capture")

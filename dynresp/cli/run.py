@@ -108,6 +108,15 @@ def check_folder(out: Path) -> None:
         )
 
 
+def check_file(out: Path) -> None:
+    """Refuse, before any work, to write a file where none can be written."""
+    from dynresp.errors import UsageError
+
+    if not out.name or out.is_dir():
+        raise UsageError(f"--out: expected a file, got {str(out)!r}, which is a folder")
+    check_folder(out.absolute().parent)
+
+
 def _all_diverged(content: dict[str, Any]) -> bool:
     if "outcomes" in content:
         return bool(content["outcomes"]["diverged"] == content["responses"])

@@ -86,7 +86,7 @@ def hit_outing(
         watcher.look()
     poses = np.array(watcher.poses)
     contacts = foot_contacts(character, character.kinematics(poses), fps)
-    returns = [  # the last hundred
+    returns = [  # of the last hundred those that are within the motion
         {
             "after": back.after,
             # The first frame that is shown is frame 1 of the clock.
@@ -94,6 +94,7 @@ def hit_outing(
             "distance": None if back.way is None else back.way.distance,
         }
         for back in avatar.returns
+        if back.moment is None or back.moment <= frames
     ]
     hits = sum(event.name == "contact" for event in watcher.events)
     return Outing(
@@ -101,7 +102,7 @@ def hit_outing(
         subtitle=f"{hits} hits in {seconds:.0f} s, reactions of the library {library.name!r}, "
         f"seed {seed}",
         motion=Motion(poses, fps, "walking by graph, and hit", contacts),
-        jumps_s=(),
+        jumps_s=None,
         spheres=watcher.spheres(),
         events=[event for event in watcher.events if event.time_s <= (frames - 1) / fps],
         phases=watcher.phases(),

@@ -38,13 +38,14 @@ class Outing:
         title: First line of the pictures.
         subtitle: Second line.
         motion: Its motion.
-        jumps_s: When it jumped in the graph [s].
+        jumps_s: When it jumped in the graph [s]; None where that is not known.
         sliding: The motion before its feet were fitted; None where that is not known.
         blocks: What stood about.
         paths: What was drawn on the ground.
         spheres: Balls.
         events: Moments with names.
         phases: What drove the avatar when.
+        arrived: Whether it came as far as asked.
         about: Further content of `result.json`.
         writers: What writes further files, by name.
     """
@@ -52,13 +53,14 @@ class Outing:
     title: str
     subtitle: str
     motion: Motion
-    jumps_s: Sequence[float]
+    jumps_s: Sequence[float] | None
     sliding: Motion | None = None
     blocks: Sequence[Block] = ()
     paths: Sequence[GroundPath] = ()
     spheres: Sequence[MovingSphere] = ()
     events: Sequence[Event] = ()
     phases: Sequence[Phase] = ()
+    arrived: bool = True
     about: dict[str, Any] = field(default_factory=dict)
     writers: dict[str, Writer] = field(default_factory=dict)
 
@@ -112,7 +114,7 @@ def write_outing(
     def plan(path: Path) -> None:
         from dynresp.view.plan_view import write_plan
 
-        write_plan(story, path, [at for at in outing.jumps_s if at <= story.duration])
+        write_plan(story, path, [at for at in outing.jumps_s or () if at <= story.duration])
 
     writers = {
         **story_writers(story, character, _VIDEO_PX, _VIDEO_FPS, progress),
@@ -161,7 +163,7 @@ def figures(outing: Outing, character: Character) -> dict[str, Any]:
         "seconds": motion.duration,
         "way_m": way,
         "speed_m_s": way / motion.duration if motion.duration > 0 else 0.0,
-        "jumps": len(outing.jumps_s),
+        "jumps": None if outing.jumps_s is None else len(outing.jumps_s),
         "joint_speed_step_99_rad_s": float(np.percentile(steps, 99.0)) if steps.size else 0.0,
         "foot_skate_m": _skate(motion, character),
     }

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.errors import UsageError
+from dynresp.errors import DynrespError, UsageError
 from dynresp.graphs.asked import Asked
 from dynresp.graphs.outing import Outing
 from dynresp.graphs.terrain_outing import terrain_outing
 from dynresp.graphs.worlds import TERRAIN
 from dynresp.locomotion.composing import compose
 from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.graph_config import Coordinates
 from dynresp.locomotion.search import SearchGraph, State
 from dynresp.locomotion.sketch import SketchedWalk, follow_sketch, reach
 from dynresp.locomotion.worlds.maze import random_maze
@@ -50,6 +51,12 @@ def sketch_outing(
         if asked.maze or world is not None:
             raise UsageError("over rough terrain there are no obstacles; leave out --world, --maze")
         return terrain_outing(graph, character, asked, fps=fps)
+    if graph.config.coordinates is Coordinates.FIXED:
+        raise UsageError(
+            f"the graph holds motion that belongs to places of its world "
+            f"({graph.database.world!r}), and a sketch needs motion that can be put anywhere; walk "
+            "through this one by `dynresp graph walk --choose`"
+        )
     if asked.maze:
         if world is not None:
             raise UsageError("give obstacles by --world or by --maze, not by both")
@@ -63,6 +70,10 @@ def sketch_outing(
         raise UsageError("give a path by --points or --path, or a place to reach by --goal")
     if start is None:
         start = (0.0, 0.0) if path is None else (float(path[0, 0]), float(path[0, 1]))
+    if world is not None:
+        _refuse_inside(world, start, "the start")
+        if goal is not None:
+            _refuse_inside(world, goal, "the goal")
     search = SearchGraph(graph, character)
     state = standing_at(graph, start, path[1] if path is not None else goal)
     if path is not None:
@@ -70,6 +81,11 @@ def sketch_outing(
     else:
         assert goal is not None
         walk = reach(search, state, goal, world)
+    if len(walk.frames) < 2:
+        raise DynrespError(
+            f"there is no way on from {start[0]:g},{start[1]:g}: every one would touch an obstacle "
+            "at once; begin farther from it"
+        )
     composition = compose(graph, character, walk.frames, walk.placements[0], fps)
     drawn = [] if path is None else [GroundPath("sketch", path)]
     if path is None or world is not None:
@@ -84,6 +100,7 @@ def sketch_outing(
         "the path",
         blocks=blocks_of(world),
         paths=drawn,
+        arrived=walk.arrived,
         about={"sketch": _about(walk, seconds), "maze": asked.seed if asked.maze else None},
     )
 
@@ -104,6 +121,19 @@ def standing_at(graph: MotionGraph, start: tuple[float, float], towards: Any) ->
     frame = int(frames[np.argmin(calm)])
     way = np.asarray(towards) - np.asarray(start)
     return State.at(graph, frame, *start, float(np.arctan2(way[1], way[0])))
+
+
+def _refuse_inside(world: World, place: tuple[float, float], what: str) -> None:
+    """Refuse a place where nobody can stand.
+
+    Raises:
+        UsageError: It is in a box, or beyond the bounds.
+    """
+    if float(world.distances(np.array(place))) <= 0.0:
+        raise UsageError(
+            f"{what}, {place[0]:g},{place[1]:g}, is in an obstacle or beyond the bounds "
+            f"{world.bounds}; choose another"
+        )
 
 
 def blocks_of(world: World | None) -> list[Block]:

@@ -79,6 +79,7 @@ def terrain_outing(
         f"{3 * terrain.level_m:.2f} m, seed {asked.seed}",
         blocks=shown_blocks(terrain, motion.root_positions),
         paths=[] if path is None else [GroundPath("sketch", path)],
+        arrived=walk.arrived,
         about={
             "seed": asked.seed,
             "terrain": _about(walk, off),

@@ -262,3 +262,43 @@ def test_the_step_stool(dynresp: Command, tmp_path: Path) -> None:
     )
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["graph"]["coordinates"] == "fixed"
+
+
+class TestSketchThatCannotBe:
+    def test_a_start_in_a_box(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        world = tmp_path / "world.toml"
+        world.write_text(
+            "[world]\nbounds = [-5, -5, 5, 5]\n\n[[box]]\ncenter = [0, 0]\nsize = [1, 1]\n"
+        )
+        words = ("graph", "sketch", graph, "--world", world, "--out", tmp_path / "out")
+        for more in (("--points", "0,0 4,0"), ("--goal", "0.2,0", "--start", "3,3")):
+            result = dynresp(*words, *more)
+            assert result.exit_code == 2, result.output
+            assert "in an obstacle" in result.stderr
+
+    def test_one_that_does_not_arrive(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        world = tmp_path / "world.toml"
+        world.write_text(
+            "[world]\nbounds = [-5, -5, 5, 5]\n\n[[box]]\ncenter = [2, 0]\nsize = [0.2, 9.5]\n"
+        )
+        result = dynresp(
+            "graph", "sketch", graph, "--world", world, "--goal", "4,0", "--no-video", "--out",
+            tmp_path / "out",
+        )  # fmt: skip
+        assert result.exit_code == 1, result.output
+
+    def test_fixed_coordinates(self, dynresp: Command, tmp_path: Path) -> None:
+        graph = tmp_path / "graph.npz"
+        assert dynresp("graph", "build", "stool", "--out", graph).exit_code == 0
+        result = dynresp("graph", "sketch", graph, "--goal", "3,3", "--out", tmp_path / "out")
+        assert result.exit_code == 2
+        assert "belongs to places of its world" in result.stderr
+
+
+@pytest.mark.parametrize("out", [".", "file/graph.npz"])
+def test_a_graph_that_cannot_be_written(dynresp: Command, tmp_path: Path, out: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    result = dynresp("graph", "build", "builtin", "--out", tmp_path / out)
+    assert result.exit_code == 2, result.output
+    assert "--out" in result.stderr
+    assert "loading" not in result.stderr
