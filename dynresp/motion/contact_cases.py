@@ -26,8 +26,9 @@ class ContactCase(IntEnum):
         AFTER: Begun in the blend, ended after it.
         INSIDE: All in the blend.
         ACROSS: It lasts for the whole blend, begun before or landed with it: nowhere can it pass
-            from the one motion's place to the other's. `foot_fitting` keeps it in the one's until
-            the foot is lifted; a graph may rather drop the transition.
+            from the one motion's place to the other's. `foot_fitting` puts it once, between the two
+            if it has just begun, and leaves it there until it is lifted; a graph may rather drop
+            the transition.
     """
 
     NONE = 0

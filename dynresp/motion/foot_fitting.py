@@ -11,8 +11,11 @@ four cases:
    more, the less of a blend is left in them.
 3. All in a blend: where what is played departs least from it. (The paper takes the closer of the
    two motions; the blend lies between them.)
-4. Over the whole blend: the foot stays where the motion before has it, and what departs from the
-   motion after goes in the next swing. A graph may drop such transitions (`contact_cases`).
+4. Over the whole blend: between the two motions' places, and what departs from the motion after
+   goes in the next swing. A graph may drop such transitions (`contact_cases`).
+
+A stance over which several blends lie, one after the other, is dragged the farthest. It is moved
+from the place told above to where the leg reaches it in all of its first `FitConfig.stance_s`.
 
 In the swing between two stances the correction fades from the one's to the other's, without a leap
 in velocity. Then hip, knee and ankle follow by two-bone inverse kinematics (`dynresp.motion.legs`),
@@ -58,6 +61,8 @@ class FitConfig:
         fastest: A correction changes by at most this [m/s] from stance to stance; where a swing is
             too short for it, the next stance is put nearer to the last.
         quickest: The same of its turn [rad/s].
+        hastiest: By so much a correction may change where the leg would not reach the next stance
+            otherwise [m/s].
         farthest: How far a standing foot is held from where it is played [m]; one that is dragged
             farther slides.
         root_s: Time over which the root is lowered, and raised again [s].
@@ -71,9 +76,10 @@ class FitConfig:
     still_s: float = 0.1
     fastest: float = 0.5
     quickest: float = 2.0
-    farthest: float = 0.2
+    hastiest: float = 2.0
+    farthest: float = 0.4
     root_s: float = 0.2
-    deepest: float = 0.05
+    deepest: float = 0.08
     straight: float = 0.99
 
     def __post_init__(self) -> None:
@@ -177,7 +183,9 @@ def fit_feet(
     weight = _weights(jumps, n, blend)
     counts = (_frames(config.stance_s, fps), blend, _frames(config.still_s, fps),
               _frames(config.ease_s, fps))  # fmt: skip
-    limits = (TOUCH, config.fastest / fps, config.quickest / fps, config.farthest)
+    limits = (TOUCH, config.fastest / fps, config.quickest / fps, config.farthest,
+              config.hastiest / fps, config.deepest)  # fmt: skip
+    reach = _reach(character, played, config)
     ankles, feet = played.ankles.copy(), played.feet.copy()
     changed = np.zeros(n, dtype=bool)
     for i, side in enumerate(FEET):
@@ -193,13 +201,14 @@ def fit_feet(
         contact = np.ascontiguousarray(composed.contacts[:, i], dtype=bool)
         correct_kernel(
             (played.ankles[i], played.feet[i]), (source.ankles[i], source.feet[i]),
-            contact, jump, weight, bound, sole, balls, kept, counts, limits, shift, turn,
+            contact, jump, weight, bound, sole, balls, kept,
+            (np.ascontiguousarray(played.hips[i]), reach[i]), counts, limits, shift, turn,
         )  # fmt: skip
         corrected = (np.abs(shift) > _NOTHING).any(axis=1) | (np.abs(turn) > _NOTHING).any(axis=1)
         changed |= corrected
         ankles[i] += shift
         feet[i] = rotations.multiply(rotations.from_rotation_vector(turn), feet[i])
-    drop = _lowering(character, played, ankles, fps, config)
+    drop = _lowering(played, reach, ankles, fps, config)
     if kept:
         behind = poses[kept - 1, 2] - fitted[-1, 2] - drop[kept - 1]
         away = np.arange(n) - (kept - 1)
@@ -232,20 +241,26 @@ def _weights(jumps: npt.NDArray[np.int64], n: int, blend: int) -> FloatArray:
     return weight
 
 
+def _reach(character: Character, played: FootTracks, config: FitConfig) -> FloatArray:
+    """How far an ankle may be from its hip (2, frames) [m]."""
+    reach = np.empty(played.hips.shape[:2])
+    for i, side in enumerate(FEET):
+        bones = [character.offsets[character.body(f"{side}_{x}")] for x in ("shank", "foot")]
+        longest = config.straight * sum(float(np.linalg.norm(bone)) for bone in bones)
+        reach[i] = np.maximum(longest, _length(played.hips[i] - played.ankles[i]))
+    return reach
+
+
 def _lowering(
-    character: Character, played: FootTracks, ankles: FloatArray, fps: float, config: FitConfig
+    played: FootTracks, reach: FloatArray, ankles: FloatArray, fps: float, config: FitConfig
 ) -> FloatArray:
     """How far the root is lowered so that legs reach (frames,) [m].
 
     Ankles (2, frames, 3) that are then still out of reach are drawn in, in place.
     """
-    reach = np.empty(ankles.shape[:2])
     need = np.zeros(ankles.shape[1])
-    for i, side in enumerate(FEET):
-        bones = [character.offsets[character.body(f"{side}_{x}")] for x in ("shank", "foot")]
-        longest = config.straight * sum(float(np.linalg.norm(bone)) for bone in bones)
+    for i in range(len(FEET)):
         way = played.hips[i] - ankles[i]
-        reach[i] = np.maximum(longest, np.linalg.norm(played.hips[i] - played.ankles[i], axis=1))
         down = way[:, 2] - np.sqrt(np.maximum(reach[i] ** 2 - np.sum(way[:, :2] ** 2, axis=1), 0))
         need = np.where(_length(way) > reach[i] + _NOTHING, np.maximum(need, down), need)
     if not need.any():

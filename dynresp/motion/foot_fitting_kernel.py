@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit, types
 
 from dynresp.compiling import compiled
+from dynresp.motion.foot_fitting_place_kernel import put
 from dynresp.motion.quaternion_kernel import (
     from_to,
     from_vector,
@@ -201,26 +202,6 @@ def _hold(  # type: ignore[no-untyped-def]
 
 
 @njit
-def _put(start, stop, window_stop, last, weight, fastest, shift):  # type: ignore[no-untyped-def]
-    """Shift a stance that begins to where it departs least from what is played."""
-    total = mean_x = mean_y = 0.0
-    for k in range(start, window_stop):
-        total += weight[k]
-        mean_x += weight[k] * shift[k, 0]
-        mean_y += weight[k] * shift[k, 1]
-    x, y = -mean_x / total, -mean_y / total
-    if last >= 0:
-        # The first shift is 0 so far.
-        off_x, off_y = x - shift[last, 0], y - shift[last, 1]
-        length = math.sqrt(off_x * off_x + off_y * off_y)
-        part = min(1.0, fastest * (start - last) / max(length, 1e-12))
-        x, y = shift[last, 0] + part * off_x, shift[last, 1] + part * off_y
-    for k in range(start, stop):
-        shift[k, 0] += x
-        shift[k, 1] += y
-
-
-@njit
 def _restrain(start, stop, goes_on, farthest, shift):  # type: ignore[no-untyped-def]
     """Let a foot slide that would be held too far from where it is played."""
     if goes_on:
@@ -266,12 +247,26 @@ def _swing(last, following, known, ease, values):  # type: ignore[no-untyped-def
 @compiled(
     types.void(
         _TRACK, _TRACK, _FLAGS, _FLAGS, _NUMBERS, _NUMBERS, _ROWS, _ROWS, types.int64,
-        types.UniTuple(types.int64, 4), types.UniTuple(types.float64, 4),
+        types.Tuple((_ROWS, _NUMBERS)),
+        types.UniTuple(types.int64, 4), types.UniTuple(types.float64, 6),
         types.float64[:, ::1], types.float64[:, ::1],
     )
 )  # fmt: skip
 def correct_kernel(  # type: ignore[no-untyped-def]
-    played, source, contact, jump, weight, bound, sole, balls, kept, frames, limits, shift, turn
+    played,
+    source,
+    contact,
+    jump,
+    weight,
+    bound,
+    sole,
+    balls,
+    kept,
+    leg,
+    frames,
+    limits,
+    shift,
+    turn,
 ):
     """Write the corrections of one foot.
 
@@ -285,16 +280,19 @@ def correct_kernel(  # type: ignore[no-untyped-def]
         sole: (4, 4) corners of the sole in the foot's frame, and radii of 0.
         balls: (b, 4) balls that hold the whole foot: centres in its frame, and radii [m].
         kept: Frames at the beginning whose correction is given.
+        leg: (n, 3) the hip as played, and (n,) how far from there the ankle may be [m].
         frames: How many a stance is looked at ahead; in how many a misfit to the source fades; a
             slide; and a correction in the swing.
         limits: How much higher a corner that touches is than the lowest [m]; by how much a
-            correction may change a frame on the way to a stance [m]; the same turning [rad]; and
-            how far a standing foot is held from where it is played [m].
+            correction may change a frame on the way to a stance [m]; the same turning [rad]; how
+            far a standing foot is held from where it is played [m]; by how much a correction may
+            change a frame where the leg would not reach otherwise [m]; and how far the hips may be
+            lowered [m].
         shift: (n, 3) in the first `kept` rows, out in the others.
         turn: (n, 3) likewise.
     """
     window, blend, still, ease = frames
-    touch, fastest, quickest, farthest = limits
+    touch, _, quickest, farthest, _, _ = limits
     n = len(contact)
     ways, touching = np.empty((4, 3)), np.empty(4, np.bool_)
     known = contact.copy()
@@ -307,12 +305,9 @@ def correct_kernel(  # type: ignore[no-untyped-def]
             continue
         goes_on = start == kept and kept > 0 and contact[kept - 1]
         stop = start + 1
-        window_stop = min(start + window, n)
         while stop < n and contact[stop]:
-            if jump[stop]:
-                window_stop = min(window_stop, stop)
             stop += 1
-        window_stop = min(window_stop, stop)
+        window_stop = min(start + window, stop)
         yaw = 0.0
         if not goes_on:
             yaw = _facing(start, window_stop, last, played, source, weight, turn, quickest)
@@ -326,7 +321,7 @@ def correct_kernel(  # type: ignore[no-untyped-def]
             ways, touching,
         )  # fmt: skip
         if not goes_on:
-            _put(start, stop, window_stop, last, weight, fastest, shift)
+            put(start, stop, window_stop, last, weight, played, leg, limits, shift)
         _restrain(start, stop, goes_on, farthest, shift)
         last, start = stop - 1, stop
     last = kept - 1

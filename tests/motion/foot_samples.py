@@ -153,3 +153,25 @@ def standing_over(
     contacts = contacts.copy()
     contacts[90:, 0] = False
     return replace(composed, contacts=contacts), foot_states(character, poses[:1])[0][0]
+
+
+def dragged(character: Character, way: float) -> Composed:
+    """Somebody who stands on one leg, then on the other, which two blends carry on by a way each.
+
+    The body stays; the second stance lasts 0.7 s, both blends reach beyond its end.
+    """
+    poses = crouched(character, standing(character, 4.0, FPS).poses, 0.05)
+    n, blend = len(poses), 30
+    contacts = np.zeros((n, 2), dtype=bool)
+    contacts[:40, 1] = contacts[50:72, 0] = contacts[84:, 1] = True
+    ankles, _ = foot_states(character, poses)
+    played, source = ankles.copy(), ankles.copy()
+    jumps = [54, 62]
+    for jump in jumps:
+        since = np.arange(n) - jump
+        played[:, 0, 0] += way * (rotations.ease(since / blend) - rotations.ease((since - 30) / 20))
+        source[:, 0, 0] += way * ((since >= 0) - rotations.ease((since - 30) / 20))
+    return Composed(
+        legs.place_ankles(character, poses, played), legs.place_ankles(character, poses, source),
+        contacts, jumps, FPS, blend / FPS,
+    )  # fmt: skip

@@ -13,6 +13,7 @@ from dynresp.errors import MotionError, UsageError
 from dynresp.motion import rotations
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.foot_fitting_place_kernel import into_discs
 from dynresp.motion.ground import clearances, sole_points
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import FEET, Motion
@@ -22,6 +23,7 @@ from tests.motion.foot_samples import (
     BLEND_S,
     FPS,
     crouched,
+    dragged,
     drifting,
     foot_states,
     jumping,
@@ -62,6 +64,8 @@ class TestStances:
     def test_equal_their_twin(self, character: Character, rng: np.random.Generator) -> None:
         """Without a jump: each stance by plain loops, each swing by textbook cubics."""
         motion = drifting(character, rng, 4.0)
+        # Legs that are bent reach everywhere.
+        motion = replace(motion, poses=crouched(character, motion.poses))
         config = FitConfig(ease_s=10.0, fastest=100.0)
         ankles, feet = foot_states(character, motion.poses)
         got, _ = foot_states(character, fit_feet(character, unjumped(motion), config))
@@ -130,6 +134,19 @@ class TestStances:
         gone = ankles[stands, 0, :2] - before[0, :2]
         np.testing.assert_allclose(gone, 0.0, atol=1e-6)
 
+    def test_a_stance_that_blends_drag_far_is_put_within_reach(self, character: Character) -> None:
+        """It begins, and one blend after the other carries it on by half a step."""
+        composed = dragged(character, 0.3)
+        assert worst_slide(character, composed.poses, composed.contacts) > 5e-3
+        fitted = fit_feet(character, composed)
+        assert worst_slide(character, fitted, composed.contacts) < 1e-6
+        ankles, _ = foot_states(character, fitted)
+        away = np.abs(ankles - foot_states(character, composed.poses)[0])[:, 0, 0]
+        stands = composed.contacts[:, 0]
+        assert away[stands].max() < 0.25
+        lowered = composed.poses[:, 2] - fitted[:, 2]
+        assert lowered.max() < FitConfig().deepest
+
     def test_a_foot_is_not_held_farther_away_than_allowed(self, character: Character) -> None:
         composed, _ = standing_over(character, 0.3)
         config = FitConfig(farthest=0.1)
@@ -137,6 +154,26 @@ class TestStances:
         played, _ = foot_states(character, composed.poses)
         away = np.linalg.norm((ankles - played)[..., :2], axis=-1)
         assert away.max() == pytest.approx(0.1, abs=1e-3)
+
+
+class TestDiscs:
+    """Places within reach of a leg, seen from above."""
+
+    @given(seed=seeds, count=st.integers(1, 30))
+    @settings(max_examples=40)
+    def test_a_point_is_moved_into_them_or_between(self, seed: int, count: int) -> None:
+        rng = np.random.default_rng(seed)
+        along = np.linspace(-1.0, 1.0, count)[:, None]
+        centres = along * rng.normal(scale=0.25, size=2) + rng.normal(scale=0.02, size=(count, 2))
+        discs = np.column_stack([centres, rng.uniform(0.05, 0.5) + 0.02 * along])
+        start = rng.normal(scale=0.2, size=2)
+        x, y, inside = into_discs(*start, discs)
+        best = foot_fitting.least_outside(discs)
+        out = foot_fitting.outside((x, y), discs)
+        assert inside == (out <= 1e-4)
+        assert out < (0.01 if best < 0.0 else best + 0.03)
+        if foot_fitting.outside(start, discs) <= 0.0:
+            assert (x, y) == tuple(start)
 
 
 class TestTheRest:

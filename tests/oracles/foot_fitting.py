@@ -1,6 +1,7 @@
 """Slow twins of foot skating and fitting: plain loops, SciPy's rotations, and mink's solver."""
 
 import math
+from collections.abc import Sequence
 
 import daqp  # noqa: F401  (the solver that mink is told to use)
 import mink
@@ -48,6 +49,23 @@ def slide(
     a, b = (place + turned.apply(sole) for place, turned in (before, after))
     stands = a[:, 2] <= a[:, 2].min() + touch
     return stillest_way((b - a)[stands, :2])
+
+
+def outside(point: Sequence[float] | FloatArray, discs: FloatArray) -> float:
+    """How far a point is out of the one of discs (m, 3) that it is farthest out of [m]."""
+    return max(math.hypot(point[0] - x, point[1] - y) - radius for x, y, radius in discs)
+
+
+def least_outside(discs: FloatArray) -> float:
+    """The least that any point is `outside` of discs (m, 3), by a grid that is made ever finer."""
+    middle = discs[:, :2].mean(axis=0)
+    best, size = (float(middle[0]), float(middle[1])), 1.0
+    while size > 1e-5:
+        steps = np.linspace(-size, size, 9)
+        grid = [(best[0] + x, best[1] + y) for x in steps for y in steps]
+        best = min(grid, key=lambda point: outside(point, discs))
+        size *= 0.5
+    return outside(best, discs)
 
 
 def unslid(source: FloatArray, turns: Rotation, sole: FloatArray, touch: float) -> FloatArray:
