@@ -1,0 +1,1 @@
+"""Control by video: silhouettes of a person before a camera against those of the database."""

@@ -1,0 +1,181 @@
+"""Foreground segmentation: where in a picture the person is.
+
+A mixture of Gaussians a pixel learns the room (OpenCV's MOG2); what fits none of them is
+foreground, unless it is the room darkened by a shadow. Light that moves over the room would be
+foreground as well, so every picture is first divided by how much brighter each part of it is than
+the room as learnt, a smooth field measured around the person. Where the person was found the
+room is not learnt, so that somebody standing still does not become furniture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.errors import MotionError
+
+Picture = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.uint8]
+
+# The room is learnt from every so many pictures: it changes slowly, and learning takes time.
+_LEARN_EVERY = 4
+
+
+@dataclass(frozen=True)
+class SegmentationConfig:
+    """How the person is told from the room.
+
+    Attributes:
+        empty_s: How long the room is seen without the person at first [s].
+        largest: Pictures are shrunk until no side is longer [pixels].
+        threshold: Squared distance from the room's colour, in variances, beyond which a pixel is
+            foreground.
+        learning: Share of a picture that is learnt once the room is known.
+        shadow: A shadow may darken the room to this share.
+        light_cells: Cells across the picture in which light is measured.
+        least_share: A person covers at least this share of the picture.
+    """
+
+    empty_s: float = 1.0
+    largest: int = 320
+    threshold: float = 25.0
+    learning: float = 0.02
+    shadow: float = 0.55
+    light_cells: int = 16
+    least_share: float = 0.001
+
+
+class Segmenter:
+    """Finds the person in the pictures of one camera that stands still."""
+
+    def __init__(self, fps: float, config: SegmentationConfig | None = None) -> None:
+        """Know nothing of the room yet.
+
+        Args:
+            fps: Pictures per second.
+            config: How to tell the person from the room.
+        """
+        import cv2
+
+        self.config = config or SegmentationConfig()
+        self._empty_frames = max(2, round(self.config.empty_s * fps))
+        self._seen = 0
+        self._room: Any = cv2.createBackgroundSubtractorMOG2(
+            history=500, varThreshold=self.config.threshold, detectShadows=True
+        )
+        self._room.setShadowThreshold(self.config.shadow)
+        self._mask: Mask | None = None
+        self._background: Picture | None = None
+        self._uncovered: Picture = np.empty((0, 0, 3), dtype=np.uint8)
+
+    def segment(self, picture: Picture) -> Mask | None:
+        """Look at the next picture.
+
+        Args:
+            picture: (height, width, 3), blue green red as OpenCV has them.
+
+        Returns:
+            (h, w) 255 where the person is, else 0, of the shrunk picture; None while the room is
+            being learnt, and where nobody is seen.
+
+        Raises:
+            MotionError: It is no such picture, or of another size than the ones before.
+        """
+        small = self._shrunk(picture)
+        if self._background is not None:
+            if small.shape != self._background.shape:
+                raise MotionError(
+                    f"pictures of one video must be of one size, got {small.shape[:2]} after "
+                    f"{self._background.shape[:2]} (rows, columns)"
+                )
+            small = self._in_known_light(small)
+        self._seen += 1
+        if self._seen <= self._empty_frames:
+            self._room.apply(small, learningRate=1.0 / self._seen)
+            self._background = self._room.getBackgroundImage()
+            self._uncovered = small
+            return None
+        raw = self._room.apply(small, learningRate=0.0)
+        mask = self._person(raw)
+        known = np.zeros(raw.shape, dtype=np.uint8) if mask is None else _grown(mask, 9)
+        # What was last seen of the room is learnt, so nothing of the person.
+        self._uncovered = np.where(known[..., None] > 0, self._uncovered, small)
+        if self._seen % _LEARN_EVERY == 0:
+            self._room.apply(self._uncovered, learningRate=self.config.learning)
+            self._background = self._room.getBackgroundImage()
+        self._mask = mask
+        return mask
+
+    def _shrunk(self, picture: Picture) -> Picture:
+        import cv2
+
+        fits = isinstance(picture, np.ndarray) and picture.dtype == np.uint8
+        if not fits or picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
+            what = getattr(picture, "shape", type(picture).__name__)
+            raise MotionError(
+                f"a picture must be (rows, columns, 3) of bytes, blue green red, got {what}"
+            )
+        factor = self.config.largest / max(picture.shape[:2])
+        if factor >= 1.0:
+            return picture
+        size = (max(1, round(picture.shape[1] * factor)), max(1, round(picture.shape[0] * factor)))
+        return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+    def _in_known_light(self, small: Picture) -> Picture:
+        """The picture as it would be in the light in which the room was learnt."""
+        import cv2
+
+        assert self._background is not None
+        height, width = small.shape[:2]
+        cells = (self.config.light_cells, max(2, self.config.light_cells * height // width))
+        weight = np.ones((height, width), dtype=np.float32)
+        if self._mask is not None:
+            weight[_grown(self._mask, 15) > 0] = 0.0
+
+        def coarse(image: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+            mean = cv2.resize(image, cells, interpolation=cv2.INTER_AREA)
+            return np.asarray(cv2.GaussianBlur(mean, (0, 0), 1.0), dtype=np.float32)
+
+        now = coarse(small.astype(np.float32).sum(axis=2) * weight)
+        then = coarse(self._background.astype(np.float32).sum(axis=2) * weight)
+        sure = coarse(weight)
+        # Where only the person is, the light of the neighbourhood counts.
+        gain = (now + 1e-3) / (then + 1e-3)
+        gain = np.where(sure > 0.05, gain, 1.0).astype(np.float32)
+        field = cv2.resize(gain, (width, height), interpolation=cv2.INTER_CUBIC)
+        field = np.clip(field, 0.2, 5.0)
+        return np.clip(small / field[..., None] + 0.5, 0, 255).astype(np.uint8)
+
+    def _person(self, raw: Mask) -> Mask | None:
+        """The largest thing among the foreground, clean."""
+        import cv2
+
+        found = np.where(raw == 255, 255, 0).astype(np.uint8)
+        found = np.asarray(cv2.medianBlur(found, 3), dtype=np.uint8)
+        for operation, size in ((cv2.MORPH_OPEN, 3), (cv2.MORPH_CLOSE, 5)):
+            found = np.asarray(cv2.morphologyEx(found, operation, _disc(size)), dtype=np.uint8)
+        # Parts that a belt or a background of the same colour cuts off belong to the person.
+        joined = cv2.morphologyEx(found, cv2.MORPH_CLOSE, _disc(11))
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
+        if count < 2:
+            return None
+        largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+        person = np.where(labels == largest, found, 0).astype(np.uint8)
+        if cv2.countNonZero(person) < self.config.least_share * person.size:
+            return None
+        return person
+
+
+def _disc(size: int) -> Mask:
+    import cv2
+
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), dtype=np.uint8)
+
+
+def _grown(mask: Mask, size: int) -> Mask:
+    import cv2
+
+    return np.asarray(cv2.dilate(mask, _disc(size)), dtype=np.uint8)

@@ -1,0 +1,25 @@
+import pytest
+
+from dynresp.locomotion.forest import ClusterForest
+from dynresp.locomotion.vision.recognition import Recogniser
+from dynresp.locomotion.vision.table import ViewTable
+from dynresp.motion.character import default_character
+from tests.locomotion.vision.samples import acting_forest
+
+
+@pytest.fixture(scope="session")
+def forest() -> ClusterForest:
+    """Two actions and ways between them."""
+    return acting_forest(default_character())
+
+
+@pytest.fixture(scope="session")
+def table(forest: ClusterForest) -> ViewTable:
+    """What they look like."""
+    return ViewTable.of(forest.graph.database)
+
+
+@pytest.fixture(scope="session")
+def recogniser(forest: ClusterForest, table: ViewTable) -> Recogniser:
+    """Tells them apart."""
+    return Recogniser.trained(forest.graph.database, table, forest.clusters.labels)
