@@ -5,7 +5,6 @@ the picture or, but for the sign of the seventh, mirrored, so that much of what 
 poses apart is lost. By default a shape is therefore told by a grid laid over it, as large as the
 silhouette is spread, so that like Hu's moments it depends neither on where a person is nor on how
 tall or how far away; what share of each cell is covered is then reduced to principal components.
-`docs/LOCOMOTION.md` compares the two.
 
 Of the centre its motion counts. Speeds are told in silhouette radii a second, the radius being the
 root mean square distance of a silhouette's points from its centre: about a quarter of the height
