@@ -106,10 +106,33 @@ def test_a_walk_of_no_jumps_is_the_recording(
         steps = joint_speed_steps(Motion(made.sliding, fps))
         theirs = joint_speed_steps(whole)
         assert np.percentile(steps, 99) < 1.2 * np.percentile(theirs, 99)
-    # The feet of this one do not slide: hardly anything is to be fitted, at any rate.
+
+
+@pytest.mark.parametrize(
+    "fps",
+    [
+        RATES[0],
+        *(
+            pytest.param(
+                fps,
+                marks=pytest.mark.xfail(
+                    strict=True,
+                    reason="cubics between the graph's frames move a standing foot by some "
+                    "millimetres, and the fitting lowers the root by 5 mm for it",
+                ),
+            )
+            for fps in RATES[1:]
+        ),
+    ],
+)
+def test_hardly_anything_is_fitted_where_feet_do_not_slide(
+    graph: MotionGraph, character: Character, fps: float
+) -> None:
+    clip = graph.database.clips[1]
+    made = compose(graph, character, np.arange(clip.start, clip.stop), fps=fps)
     shift, turn = differences(made.motion.poses, made.sliding)
-    assert shift < 6e-3
-    assert turn < np.radians(8.0)
+    assert shift < 1e-3
+    assert turn < np.radians(2.0)
 
 
 @pytest.mark.parametrize("fps", RATES)
