@@ -30,11 +30,11 @@ import study
 from matplotlib import pyplot as plt
 
 from dynresp.graphs.sketching import blocks_of
-from dynresp.locomotion.compare import gait_of, ground_speeds
-from dynresp.locomotion.composing import compose
-from dynresp.locomotion.distance import frame_distances, frame_features
-from dynresp.locomotion.search import SearchGraph, State
-from dynresp.locomotion.sketch import distances_to, follow_sketch
+from dynresp.locomotion.graph.distance import frame_distances, frame_features
+from dynresp.locomotion.playing.composing import compose
+from dynresp.locomotion.playing.gait import gait_of, ground_speeds
+from dynresp.locomotion.sketch.following import distances_to, follow_sketch
+from dynresp.locomotion.sketch.search import SearchGraph, State
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
 from dynresp.locomotion.worlds.planning import resampled
 from dynresp.motion import rotations

@@ -19,13 +19,13 @@ from matplotlib.typing import ColorType
 from dynresp.errors import MissingMotionDataError
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import find_plan, plans_folder, read_plan
-from dynresp.locomotion import placement
-from dynresp.locomotion.compare import Gait
-from dynresp.locomotion.database import IntArray
-from dynresp.locomotion.distance import frame_distances, frame_features
-from dynresp.locomotion.forest import ClusterTree
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.pruning import step_groups
+from dynresp.locomotion.clusters.forest import ClusterTree
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.database import IntArray
+from dynresp.locomotion.graph.distance import frame_distances, frame_features
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.pruning import step_groups
+from dynresp.locomotion.playing.gait import Gait
 from dynresp.motion.character import default_character
 from dynresp.motion.rotations import FloatArray, from_yaw
 from dynresp.motion.sources import motion_folders

@@ -32,16 +32,16 @@ from matplotlib.colors import LogNorm
 from dynresp.graphs.outing import Outing
 from dynresp.graphs.sketching import Asked, sketch_outing
 from dynresp.graphs.worlds import standing_about
-from dynresp.locomotion import placement
-from dynresp.locomotion.choice import choices
-from dynresp.locomotion.clusters import ClusterConfig, Clusters
-from dynresp.locomotion.compare import gait_of
-from dynresp.locomotion.composing import compose
-from dynresp.locomotion.forest import ClusterForest
-from dynresp.locomotion.graph_config import Coordinates
-from dynresp.locomotion.mixture import MixtureConfig
-from dynresp.locomotion.observations import observations
-from dynresp.locomotion.walk import random_walk
+from dynresp.locomotion.choice.actions import choices
+from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.clusters.grouping import ClusterConfig, Clusters
+from dynresp.locomotion.clusters.mixture import MixtureConfig
+from dynresp.locomotion.clusters.observations import observations
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.config import Coordinates
+from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.playing.composing import compose
+from dynresp.locomotion.playing.gait import gait_of
 from dynresp.motion.character import default_character
 from dynresp.motion.skating import foot_skates
 

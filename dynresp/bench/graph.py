@@ -24,14 +24,14 @@ from dynresp.bench.graph_twin import Block, NumpyPruning
 from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult, Contender, median_seconds
 from dynresp.errors import DynrespError, MotionError
-from dynresp.locomotion.blending import Playback
-from dynresp.locomotion.composing import compose
-from dynresp.locomotion.database import BoolArray, MotionDatabase
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.graph_config import GraphConfig
-from dynresp.locomotion.graph_file import load_graph, save_graph
-from dynresp.locomotion.pruning import find_transitions
-from dynresp.locomotion.walk import random_walk
+from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.graph.database import BoolArray, MotionDatabase
+from dynresp.locomotion.graph.file import load_graph, save_graph
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.pruning import find_transitions
+from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.playing.blending import Playback
+from dynresp.locomotion.playing.composing import compose
 from dynresp.motion.character import Character, default_character
 
 FRAMES = 12_879

@@ -11,7 +11,7 @@ import numpy as np
 from dynresp.errors import MissingMotionDataError
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import find_plan, read_plan
-from dynresp.locomotion.database import BoolArray, Clip, MotionDatabase
+from dynresp.locomotion.graph.database import BoolArray, Clip, MotionDatabase
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray

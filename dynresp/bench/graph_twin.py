@@ -1,7 +1,8 @@
 """Pruning of a motion graph in vectorised NumPy: what `bench graph` compares with.
 
 Blocks of rows of the matrix, every pair that the first rule allows, the same distances and rules
-as `dynresp.locomotion.pruning`, in float64. As there, a pair is compared once for its two jumps.
+as `dynresp.locomotion.graph.pruning`, in float64. As there, a pair is compared once for its two
+jumps.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.database import BoolArray, IntArray, MotionDatabase
-from dynresp.locomotion.distance import FrameFeatures, frame_distances, frame_features
-from dynresp.locomotion.graph_config import GraphConfig
-from dynresp.locomotion.pruning import step_groups, stutter_frames
+from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.graph.database import BoolArray, IntArray, MotionDatabase
+from dynresp.locomotion.graph.distance import FrameFeatures, frame_distances, frame_features
+from dynresp.locomotion.graph.pruning import step_groups, stutter_frames
 from dynresp.motion.rotations import FloatArray
 
 # Pairs compared at once: what is gathered for them, about 200 MiB, is reused.

@@ -33,7 +33,7 @@ def build(
     from dynresp.errors import MissingMotionDataError
     from dynresp.graphs.building import build_graph
     from dynresp.graphs.plan import find_plan, read_plan
-    from dynresp.locomotion.graph_file import save_graph
+    from dynresp.locomotion.graph.file import save_graph
     from dynresp.motion.character import default_character
     from dynresp.motion.sources import motion_folders
 

@@ -11,7 +11,7 @@ import typer
 from dynresp.cli.options import Json
 
 if TYPE_CHECKING:
-    from dynresp.locomotion.graph import MotionGraph
+    from dynresp.locomotion.graph.motion_graph import MotionGraph
 
 Graph = Annotated[
     Path, typer.Argument(metavar="GRAPH.npz", help="A file that `dynresp graph build` has written.")
@@ -20,7 +20,7 @@ Graph = Annotated[
 
 def info(graph: Graph, as_json: Json = False) -> None:
     """Show what a graph is made of, and how many jumps each pruning rule has left."""
-    from dynresp.locomotion.graph_file import load_graph
+    from dynresp.locomotion.graph.file import load_graph
 
     typer.echo(tell_graph(load_graph(graph), graph, as_json))
 

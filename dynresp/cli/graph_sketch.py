@@ -62,7 +62,7 @@ def sketch(
     from dynresp.graphs.asked import Asked
     from dynresp.graphs.sketching import sketch_outing
     from dynresp.graphs.world_file import read_world
-    from dynresp.locomotion.graph_file import load_graph
+    from dynresp.locomotion.graph.file import load_graph
     from dynresp.motion.character import default_character
 
     asked = Asked(

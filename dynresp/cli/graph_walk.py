@@ -16,7 +16,7 @@ from dynresp.cli.run import check_folder
 if TYPE_CHECKING:
     from dynresp.graphs.choosing import Pick
     from dynresp.graphs.outing import Outing
-    from dynresp.locomotion.graph import MotionGraph
+    from dynresp.locomotion.graph.motion_graph import MotionGraph
 
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
 Fps = Annotated[
@@ -59,9 +59,9 @@ def walk(
 
     from dynresp.errors import UsageError
     from dynresp.graphs.outing import Outing
-    from dynresp.locomotion.composing import compose
-    from dynresp.locomotion.graph_file import load_graph
-    from dynresp.locomotion.walk import random_walk
+    from dynresp.locomotion.graph.file import load_graph
+    from dynresp.locomotion.graph.walk import random_walk
+    from dynresp.locomotion.playing.composing import compose
     from dynresp.motion.character import default_character
 
     answers = None if choices is None else read_answers(choices)

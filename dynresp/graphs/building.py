@@ -14,8 +14,8 @@ from dynresp.experiments.motions import BUILTIN_PREFIX, about_cut, find_motion, 
 from dynresp.experiments.spec import MotionCut
 from dynresp.graphs.plan import GraphPlan
 from dynresp.graphs.worlds import lay_out
-from dynresp.locomotion.database import MotionDatabase
-from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.sources import checked_relative_path, list_motion_files

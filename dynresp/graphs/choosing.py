@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from dynresp.graphs.outing import Outing
-from dynresp.locomotion.blending import Playback
-from dynresp.locomotion.choice import Choice, choices
-from dynresp.locomotion.choice_control import ChoiceControl
-from dynresp.locomotion.clusters import Clusters
-from dynresp.locomotion.composing import compose
-from dynresp.locomotion.forest import ClusterForest
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.placement import wrapped
+from dynresp.locomotion.choice.actions import Choice, choices
+from dynresp.locomotion.choice.control import ChoiceControl
+from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.placement import wrapped
+from dynresp.locomotion.playing.blending import Playback
+from dynresp.locomotion.playing.composing import compose
 from dynresp.motion.character import Character
 
 OPTIONS = "options.png"

@@ -11,10 +11,10 @@ import numpy as np
 from dynresp.experiments.choosing import take_chooser
 from dynresp.experiments.spec import ChoiceTable
 from dynresp.graphs.outing import Outing
-from dynresp.locomotion.avatar import Avatar, Doing, Wanderer
-from dynresp.locomotion.avatar_crowd import AvatarCrowd
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.placement import IDENTITY
+from dynresp.locomotion.avatar.avatar import Avatar, Doing, Wanderer
+from dynresp.locomotion.avatar.crowd import AvatarCrowd
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.placement import IDENTITY
 from dynresp.motion.character import Character
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.library import default_library

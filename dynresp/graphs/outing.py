@@ -13,9 +13,9 @@ from dynresp.experiments.folder import RESULT, WRITTEN, clear_response
 from dynresp.experiments.result import versions, write_json
 from dynresp.experiments.story_files import Progress, Writer, story_writers, write_files
 from dynresp.graphs.worlds import standing_about
-from dynresp.locomotion.composing import Composition
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.graph_file import graph_identity
+from dynresp.locomotion.graph.file import graph_identity
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.playing.composing import Composition
 from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion

@@ -12,7 +12,7 @@ from dynresp.errors import SpecError, UnknownNameError, UsageError
 from dynresp.experiments.mistakes import explain_in_tables, read_toml, validate
 from dynresp.experiments.spec import MotionCut, Strict
 from dynresp.experiments.values import fixed
-from dynresp.locomotion.graph_config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.config import Coordinates, GraphConfig
 from dynresp.locomotion.worlds.terrain import LEVEL_M
 from dynresp.motion.collection import GRAPHS
 from dynresp.paths import examples_folder

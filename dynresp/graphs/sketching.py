@@ -11,11 +11,11 @@ from dynresp.graphs.asked import Asked
 from dynresp.graphs.outing import Outing
 from dynresp.graphs.terrain_outing import terrain_outing
 from dynresp.graphs.worlds import TERRAIN
-from dynresp.locomotion.composing import compose
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.graph_config import Coordinates
-from dynresp.locomotion.search import SearchGraph, State
-from dynresp.locomotion.sketch import SketchedWalk, follow_sketch, reach
+from dynresp.locomotion.graph.config import Coordinates
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.playing.composing import compose
+from dynresp.locomotion.sketch.following import SketchedWalk, follow_sketch, reach
+from dynresp.locomotion.sketch.search import SearchGraph, State
 from dynresp.locomotion.worlds.maze import random_maze
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion.character import Character

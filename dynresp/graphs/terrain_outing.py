@@ -8,7 +8,7 @@ import numpy as np
 
 from dynresp.graphs.asked import Asked
 from dynresp.graphs.outing import Outing
-from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_fitting import compose_on_terrain, footing, walk_blocks
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynresp.locomotion.database import BoolArray
+from dynresp.locomotion.graph.database import BoolArray
 from dynresp.locomotion.worlds.blocks import onto_blocks
 from dynresp.locomotion.worlds.playground import playground_contacts, recorded_playground
 from dynresp.locomotion.worlds.stool import from_all_sides, stool_contacts, stool_world

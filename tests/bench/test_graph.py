@@ -11,10 +11,10 @@ from dynresp.bench import graph as bench
 from dynresp.bench.graph_database import database_of
 from dynresp.bench.graph_twin import NumpyPruning
 from dynresp.errors import DynrespError
-from dynresp.locomotion.graph_config import Coordinates, GraphConfig
-from dynresp.locomotion.pruning import Transitions, find_transitions
+from dynresp.locomotion.graph.config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.pruning import Transitions, find_transitions
 from dynresp.motion import rotations
-from tests.locomotion.graph_samples import made_database
+from tests.locomotion.graph.graph_samples import made_database
 
 
 @pytest.fixture(autouse=True)

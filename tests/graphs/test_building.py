@@ -7,7 +7,7 @@ from dynresp.errors import MissingMotionDataError, SpecError, UnknownNameError
 from dynresp.graphs import building
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import GraphPlan, find_plan, read_plan
-from dynresp.locomotion.graph_file import graph_identity
+from dynresp.locomotion.graph.file import graph_identity
 from dynresp.motion.character import Character
 from dynresp.motion.export import write_npz
 from tests.locomotion.samples import walking_motions

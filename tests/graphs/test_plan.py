@@ -4,7 +4,7 @@ import pytest
 
 from dynresp.errors import SpecError, UnknownNameError
 from dynresp.graphs.plan import find_plan, plan_names, read_plan
-from dynresp.locomotion.graph_config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.config import Coordinates, GraphConfig
 
 
 def written(folder: Path, text: str) -> Path:

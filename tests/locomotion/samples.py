@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.graph_config import GraphConfig
+from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion

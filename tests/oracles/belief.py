@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.database import MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.vision.belief import BeliefConfig
 from dynresp.locomotion.vision.table import ViewTable
 

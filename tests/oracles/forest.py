@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dynresp.locomotion.clusters import Clusters
-from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 
 ALIKE = 3
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.graph_config import GraphConfig
+from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.rotations import FloatArray
 
 

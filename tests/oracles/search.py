@@ -1,6 +1,6 @@
 """The search along a path and its collision test, slow and readable.
 
-What `dynresp.locomotion.search` and `dynresp.locomotion.worlds` must equal on small graphs.
+What `dynresp.locomotion.sketch.search` and `dynresp.locomotion.worlds` must equal on small graphs.
 """
 
 import copy
@@ -10,10 +10,10 @@ import math
 import mujoco
 import numpy as np
 
-from dynresp.locomotion import placement
-from dynresp.locomotion.blending import Playback
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.search import SearchConfig, State
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.playing.blending import Playback
+from dynresp.locomotion.sketch.search import SearchConfig, State
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion import rotations
 from dynresp.motion.character import Character

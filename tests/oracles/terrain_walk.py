@@ -6,9 +6,9 @@ and feet that need not be drawn in.
 
 import numpy as np
 
-from dynresp.locomotion import placement
-from dynresp.locomotion.database import BoolArray
-from dynresp.locomotion.search import State
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.database import BoolArray
+from dynresp.locomotion.sketch.search import State
 from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph

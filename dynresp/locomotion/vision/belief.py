@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.database import MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.vision.table import ViewTable
 
 # How the facing of the last moment is taken over to something new: a share goes to the neighbours

@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.locomotion import placement
-from dynresp.locomotion.database import IntArray
-from dynresp.locomotion.forest import ClusterForest
+from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.vision.belief import Belief, BeliefConfig
 from dynresp.locomotion.vision.recognition import Recogniser
 from dynresp.locomotion.vision.table import ViewTable

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynresp.locomotion.database import IntArray
+from dynresp.locomotion.graph.database import IntArray
+from dynresp.locomotion.graph.walk import check_in_component, random_walk
 from dynresp.locomotion.vision.control import VideoControl
 from dynresp.locomotion.vision.segmentation import Mask, Picture, SegmentationConfig
 from dynresp.locomotion.vision.watching import Watcher
-from dynresp.locomotion.walk import check_in_component, random_walk
 
 CHOICE_S = 0.1
 """Time between choices [s], as in the paper."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.database import IntArray, MotionDatabase
+from dynresp.locomotion.graph.database import IntArray, MotionDatabase
 from dynresp.locomotion.vision.table import ViewTable
 from dynresp.motion.rotations import FloatArray
 

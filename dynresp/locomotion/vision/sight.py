@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynresp.locomotion.clusters import Clusters
-from dynresp.locomotion.database import MotionDatabase
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.mixture import MixtureConfig, fit_mixture
-from dynresp.locomotion.observations import WALK_CYCLE_S
+from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.clusters.mixture import MixtureConfig, fit_mixture
+from dynresp.locomotion.clusters.observations import WALK_CYCLE_S
+from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character, default_character
 from dynresp.motion.rotations import FloatArray

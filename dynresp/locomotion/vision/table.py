@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from dynresp.archive import TEXT, ArchiveFormat, text_array
 from dynresp.errors import DynrespError, GraphFileError
-from dynresp.locomotion.database import MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.vision.features import FeatureConfig, Shape, measure, speeds
 from dynresp.locomotion.vision.silhouettes import PIXEL, Viewpoints, draw_silhouettes
 from dynresp.motion.character import ROOT, Character, default_character

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.locomotion import placement
+from dynresp.locomotion.graph import placement
 from dynresp.locomotion.worlds.contacts import heights_above
 from dynresp.motion.rotations import FloatArray
 

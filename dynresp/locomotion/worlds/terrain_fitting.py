@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.composing import Composition, compose
+from dynresp.locomotion.playing.composing import Composition, compose
 from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import IntArray, TerrainGraph, runs

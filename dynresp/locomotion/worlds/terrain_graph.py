@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import MotionError, UsageError
-from dynresp.locomotion import placement
-from dynresp.locomotion.graph import MotionGraph
-from dynresp.locomotion.graph_config import Coordinates
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.config import Coordinates
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.motion.character import Character, default_character

@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.locomotion import placement
-from dynresp.locomotion.search import State
-from dynresp.locomotion.walk import check_in_component
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.walk import check_in_component
+from dynresp.locomotion.sketch.search import State
 from dynresp.locomotion.worlds.planning import resampled
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import IntArray, TerrainGraph

@@ -1,6 +1,6 @@
 import pytest
 
-from dynresp.locomotion.forest import ClusterForest
+from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.vision.recognition import Recogniser
 from dynresp.locomotion.vision.table import ViewTable
 from dynresp.motion.character import default_character

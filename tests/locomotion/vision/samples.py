@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from dynresp.locomotion.clusters import Clusters
-from dynresp.locomotion.database import MotionDatabase
-from dynresp.locomotion.forest import ClusterForest
-from dynresp.locomotion.graph import MotionGraph, PruningCounts
-from dynresp.locomotion.graph_config import GraphConfig
-from dynresp.locomotion.mixture import Mixture
+from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.clusters.mixture import Mixture
+from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.graph.motion_graph import MotionGraph, PruningCounts
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion

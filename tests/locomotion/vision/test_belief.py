@@ -5,7 +5,7 @@ from dynresp.errors import UsageError
 from dynresp.locomotion.vision.belief import Belief, BeliefConfig
 from dynresp.locomotion.vision.silhouettes import Viewpoints
 from dynresp.locomotion.vision.table import ViewTable
-from tests.locomotion.graph_samples import made_database
+from tests.locomotion.graph.graph_samples import made_database
 from tests.oracles import belief as oracle
 
 

@@ -11,7 +11,7 @@ from dynresp.locomotion.vision.control import (
     warped_costs,
 )
 from dynresp.locomotion.vision.recognition import Recogniser
-from tests.locomotion.forest_samples import random_forest
+from tests.locomotion.clusters.forest_samples import random_forest
 from tests.locomotion.vision.samples import STEPPING, WAVING
 
 

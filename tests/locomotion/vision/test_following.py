@@ -7,8 +7,8 @@ from dynresp.locomotion.vision.following import follow
 from dynresp.locomotion.vision.video import Video
 from dynresp.locomotion.vision.watching import Watcher
 from dynresp.motion.motion import Motion
-from tests.locomotion.video_samples import BODIES, Filming, film, person, write_video
 from tests.locomotion.vision.samples import STEPPING, WAVING, stepping, waving
+from tests.locomotion.vision.video_samples import BODIES, Filming, film, person, write_video
 
 
 def acted(who: str, seed: int, folder, fps: float = 30.0) -> list[np.ndarray]:

@@ -4,8 +4,8 @@ import pytest
 from dynresp.errors import MotionError
 from dynresp.locomotion.vision.segmentation import SegmentationConfig, Segmenter
 from dynresp.motion.motion import Motion
-from tests.locomotion.video_samples import BODIES, Filming, film, person
 from tests.locomotion.vision.samples import stepping, waving
+from tests.locomotion.vision.video_samples import BODIES, Filming, film, person
 
 
 def overlap(a: np.ndarray, b: np.ndarray) -> float:

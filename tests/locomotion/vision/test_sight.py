@@ -1,6 +1,6 @@
 import numpy as np
 
-from dynresp.locomotion.database import MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.vision.sight import cluster_by_sight, sight_observations
 from dynresp.motion import rotations
 from dynresp.motion.motion import Motion

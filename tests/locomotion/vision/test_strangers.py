@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dynresp.locomotion.database import MotionDatabase
-from dynresp.locomotion.forest import ClusterForest
-from dynresp.locomotion.graph import MotionGraph
+from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.vision.control import VideoControl
 from dynresp.locomotion.vision.following import follow
 from dynresp.locomotion.vision.recognition import Recogniser
@@ -14,7 +14,7 @@ from dynresp.locomotion.vision.table import ViewTable
 from dynresp.locomotion.vision.video import Video
 from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions, load_motion
-from tests.locomotion.video_samples import BODIES, Filming, film, person, write_video
+from tests.locomotion.vision.video_samples import BODIES, Filming, film, person, write_video
 
 DATABASE = (
     "snumrl_ys2010/VideoMotion/wd2_freeWalk_01.bvh",

@@ -6,7 +6,7 @@ from dynresp.locomotion.vision.features import FeatureConfig, Shape, measure
 from dynresp.locomotion.vision.silhouettes import Viewpoints, draw_silhouettes
 from dynresp.locomotion.vision.table import ViewTable
 from dynresp.motion.character import default_character
-from tests.locomotion.graph_samples import made_database
+from tests.locomotion.graph.graph_samples import made_database
 
 
 def test_a_silhouette_has_the_row_of_its_frame(forest, table) -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from dynresp.errors import MotionFileError
 from dynresp.locomotion.vision.video import Video
-from tests.locomotion.video_samples import SIZE, write_video
+from tests.locomotion.vision.video_samples import SIZE, write_video
 
 
 @pytest.mark.parametrize(("codec", "ending"), [("mp4v", "mp4"), ("MJPG", "avi")])

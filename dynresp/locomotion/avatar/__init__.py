@@ -1,0 +1,1 @@
+"""Avatars that walk by graph, are hit, and walk on."""

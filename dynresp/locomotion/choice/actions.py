@@ -1,0 +1,252 @@
+"""Control by choice: a few well-dispersed actions at any moment (Lee et al. 2002, section 5.1).
+
+Candidates are the leaves of that part of the cluster tree which a window in time and space selects
+(figure 6). The action that is most probable without a user comes first, then again and again the
+one farthest from all before it, in where it ends, how it faces there, and the pose it shows. Each
+is told by the most probable motion of its cluster path (eq. 7), which then stays in the last
+cluster by the most probable ways, as long as time and space allow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.locomotion.choice.window import ChoiceWindow
+from dynresp.locomotion.clusters.forest import ClusterForest, ClusterTree
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.config import Coordinates
+from dynresp.locomotion.graph.database import IntArray
+from dynresp.motion.rotations import FloatArray
+
+# How far to look ahead without an upper bound in time [s]; if need be, half as far again.
+_NEAR_S = 4.0
+# To face the other way counts as being so far apart [m]; a half radian of a joint is a metre.
+_TURNED_M = 1.0
+# Actions closer than this [m] count as one.
+_ALIKE_M = 0.25
+# With so many there is no need to look further ahead for more.
+_ENOUGH = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """An action that is offered.
+
+    Attributes:
+        start: The frame at which it was offered.
+        frames: (s,) frames to play after that one.
+        path: (s + 1, 4) planar states of the root in the world, from `start` on; its first two
+            columns are the line on the ground to show.
+        enters: Index into `frames` of the first in the action's own cluster.
+        clusters: (p,) the cluster path; its last is the action's own.
+        example: Frame whose pose stands for the cluster.
+        pose: (59,) that pose where the action ends, in the world.
+        log_probability: Of the motion up to where it enters the cluster (eq. 7), given the branch
+            from which the tree grows.
+    """
+
+    start: int
+    frames: IntArray
+    path: FloatArray
+    enters: int
+    clusters: IntArray
+    example: int
+    pose: FloatArray
+    log_probability: float
+
+    @property
+    def cluster(self) -> int:
+        """The cluster to which it leads."""
+        return int(self.clusters[-1])
+
+
+def choices(
+    forest: ClusterForest,
+    frame: int,
+    place: npt.ArrayLike = placement.IDENTITY,
+    window: ChoiceWindow | None = None,
+) -> tuple[Choice, ...]:
+    """Actions to choose from.
+
+    Args:
+        forest: The cluster trees.
+        frame: The frame the avatar is at.
+        place: (4,) where its clip is put in the world.
+        window: How many, and where and when they may end.
+
+    Returns:
+        At most as many as wanted, all different; the one most probable without a choice first.
+        Fewer where the window has no more, none where it is out of reach.
+
+    Raises:
+        UsageError: The frame is not in the graph's component.
+    """
+    window = window or ChoiceWindow()
+    lead, at = forest.branch(frame), np.asarray(place, dtype=np.float64)
+    offered: list[Choice] = []
+    bounds = list(_bounds(forest, window, len(lead) - 1))
+    for most_s in bounds:
+        most = forest.depth(most_s)
+        if most < len(lead):
+            continue
+        candidates = _Candidates.of(forest, lead, at, window, most)
+        # Few candidates are not looked at where there will be more.
+        if len(candidates.nodes) < _ENOUGH and most_s < bounds[-1]:
+            continue
+        offered = candidates.dispersed()
+        if len(offered) >= min(window.wanted, _ENOUGH):
+            break
+    return tuple(offered)
+
+
+def _bounds(forest: ClusterForest, window: ChoiceWindow, waited: int) -> Iterator[float]:
+    """How far to look ahead [s], until there is enough; trees begin after `waited` frames."""
+    if window.most_s is not None:
+        yield window.most_s
+        return
+    bound, last = _NEAR_S, forest.time_bound_s + waited / forest.graph.database.fps
+    while bound < last:
+        yield bound
+        bound *= 1.5
+    yield last
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Leaves of the subtree that a window selects.
+
+    Attributes:
+        forest: Whose trees.
+        tree: The tree.
+        lead: (l,) frames from the avatar's to the root of the tree.
+        place: (4,) where the clip of the first of them is put.
+        window: The window.
+        least: Fewest frames after the avatar's until an action's own cluster is entered.
+        most: Most frames after the avatar's.
+        nodes: (k,) the leaves.
+        places: (k, 4) where they are entered along the tree's own ways.
+    """
+
+    forest: ClusterForest
+    tree: ClusterTree
+    lead: IntArray
+    place: FloatArray
+    window: ChoiceWindow
+    least: int
+    most: int
+    nodes: npt.NDArray[np.intp]
+    places: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        forest: ClusterForest,
+        lead: IntArray,
+        place: FloatArray,
+        window: ChoiceWindow,
+        most: int,
+    ) -> _Candidates:
+        database, waited = forest.graph.database, len(lead) - 1
+        tree = forest.tree(int(lead[-1]), (most - waited) / database.fps)
+        least = math.ceil(window.least_s * database.fps - 1e-6)
+        late = tree.steps[tree.node_visits] + waited >= least
+        late[0] = False
+        nodes = np.flatnonzero(late)
+        if window.area is None:
+            # Where each lies need not be known first, and most of them are no leaves.
+            nodes = _outermost(tree, nodes)
+        root = forest.places_along(lead, place)[-1]
+        clip = placement.compose(root, placement.inverse(database.planar[tree.root]))
+        places = placement.compose(clip, forest.places(tree, nodes))
+        if window.area is not None:
+            nodes_inside = _outermost(tree, nodes[window.area.contains(places[:, :2])])
+            kept = np.searchsorted(nodes, nodes_inside)
+            nodes, places = nodes[kept], places[kept]
+        return cls(forest, tree, lead, place, window, least, most, nodes, places)
+
+    def dispersed(self) -> list[Choice]:
+        """The actions that are farthest from each other, at most as many as wanted."""
+        if len(self.nodes) == 0:
+            return []
+        means = self.forest.clusters.mixture.means[self.tree.node_clusters[self.nodes]]
+        features = _features(self.places, means)
+        probability = self.tree.log_probabilities[self.tree.node_visits[self.nodes]]
+        best = int(np.argmax(probability))
+        nearest = np.full(len(self.nodes), np.inf)
+        offered: list[Choice] = []
+        ends = np.empty((0, features.shape[1]))
+        # A candidate whose motion turns out to be like one before costs a look, so they are few.
+        for _ in range(3 * self.window.wanted):
+            choice = self._told(int(self.nodes[best]))
+            end = _features(choice.path[-1:], means[best][None])
+            nearest[best] = -1.0
+            if len(offered) == 0 or _distances(ends, end).min() >= _ALIKE_M:
+                offered.append(choice)
+                ends = np.vstack([ends, end])
+                nearest = np.minimum(nearest, _distances(features, end))
+            best = int(np.argmax(nearest))
+            if len(offered) == self.window.wanted or nearest[best] < _ALIKE_M:
+                break
+        return offered
+
+    def _told(self, node: int) -> Choice:
+        """The action of a node: its most probable motion, its stay, and its pose."""
+        forest, tree, area = self.forest, self.tree, self.window.area
+        waited = len(self.lead) - 1
+        left = self.most - waited
+        motion = forest.probable_motion(tree, node, left / forest.graph.database.fps)
+        # The tree's own way comes into the window; the most probable one may not.
+        for way in (motion.frames, tree.way_to(node)):
+            frames = np.concatenate([self.lead[:-1], forest.stay(way, left)])
+            path = forest.places_along(frames, self.place)
+            enters = waited + len(way) - 1
+            inside = np.ones(len(path), dtype=bool)
+            if area is not None:
+                inside = area.contains(path[:, :2])
+            if enters >= self.least and inside[enters:].any():
+                break
+        stop = int(np.flatnonzero(inside)[-1]) + 1
+        frames, path = frames[:stop], path[:stop]
+        clusters = tree.cluster_path(node)
+        example = int(forest.clusters.examples[clusters[-1]])
+        pose = _shown(forest, example, path[-1])
+        return Choice(
+            int(self.lead[0]), frames[1:], path, enters - 1, clusters, example, pose,
+            motion.log_probability,
+        )  # fmt: skip
+
+
+def _outermost(tree: ClusterTree, nodes: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Those of some nodes, ascending, that have no child among them."""
+    inner = np.zeros(len(tree.node_parents), dtype=bool)
+    inner[tree.node_parents[nodes]] = True
+    return nodes[~inner[nodes]]
+
+
+def _shown(forest: ClusterForest, example: int, end: FloatArray) -> FloatArray:
+    """(59,) a frame's pose where an action ends; as it was recorded in fixed coordinates."""
+    database, coordinates = forest.graph.database, forest.graph.config.coordinates
+    pose = database.poses[example]
+    if coordinates is Coordinates.FIXED:
+        return pose
+    at = end.copy()
+    if coordinates is Coordinates.RELATIVE:
+        at[2] = database.planar[example, 2]
+    put = placement.compose(at, placement.inverse(database.planar[example]))
+    return placement.place_poses(pose[None], put)[0]
+
+
+def _features(places: FloatArray, means: FloatArray) -> FloatArray:
+    """(k, d) whose distances say how different actions are [m]."""
+    half = 0.5 * _TURNED_M
+    heading = np.column_stack([half * np.cos(places[:, 3]), half * np.sin(places[:, 3])])
+    return np.hstack([places[:, :2], heading, means])
+
+
+def _distances(features: FloatArray, one: FloatArray) -> FloatArray:
+    return np.sqrt(np.sum((features - one) ** 2, axis=1))

@@ -1,0 +1,328 @@
+"""The lower layer: a Markov process over recorded frames (Lee et al. 2002, section 4.1).
+
+A state is a frame. From frame i the avatar goes on to the frame recorded after it, or jumps to a
+frame j whose predecessor j - 1 resembles i. Jumps are pruned by the paper's four rules, the last
+of which leaves one strongly connected component: a walk through the graph never comes to an end.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.errors import MotionError
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.database import BoolArray, IntArray, MotionDatabase
+from dynresp.motion import legs, rotations
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.contact_cases import ContactCase, contact_cases
+from dynresp.motion.motion import FEET, Motion
+from dynresp.motion.rotations import FloatArray
+
+
+@dataclass(frozen=True)
+class PruningCounts:
+    """How many jumps each rule leaves, as in the paper's table 1.
+
+    Attributes:
+        frames: Frames of the database.
+        pairs: Pairs of frames considered.
+        contact: Jumps left by the first rule, similar contacts.
+        likelihood: By the second, a probability above the threshold.
+        similarity: By the third, local maxima; None where it is not in force.
+        footing: By that of the feet: no foot would have to slip through a whole blend.
+        component: By the fourth, inside the largest strongly connected component.
+        component_frames: Frames of that component.
+    """
+
+    frames: int
+    pairs: int
+    contact: int
+    likelihood: int
+    similarity: int | None
+    footing: int
+    component: int
+    component_frames: int
+
+
+@dataclass(frozen=True, eq=False)
+class MotionGraph:
+    """Frames, and the ways from each to the next. Arrays are read-only.
+
+    The ways lie in rows, one a frame: those of frame i are `offsets[i]` to `offsets[i + 1]`. A
+    row is empty where the frame is not in the component; otherwise its first way is the recorded
+    one, to frame i + 1, unless that is not in the component.
+
+    Attributes:
+        database: The frames.
+        config: How it was made.
+        counts: What each pruning rule left.
+        offsets: (n + 1,) where the rows begin.
+        targets: (m,) the frame to which each way leads.
+        distances: (m,) distance between the frame left and the one before the target (eq. 2); 0
+            of a recorded way.
+    """
+
+    database: MotionDatabase
+    config: GraphConfig
+    counts: PruningCounts
+    offsets: npt.NDArray[np.int64]
+    targets: IntArray
+    distances: npt.NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for array in (self.offsets, self.targets, self.distances):
+            array.flags.writeable = False
+
+    @classmethod
+    def build(
+        cls,
+        motions: Sequence[Motion],
+        config: GraphConfig | None = None,
+        character: Character | None = None,
+        contacts: Sequence[BoolArray] | None = None,
+        owed_to: tuple[str, ...] = (),
+        threads: int = 0,
+    ) -> MotionGraph:
+        """Make a graph of motions.
+
+        Args:
+            motions: At any frame rate.
+            config: Settings.
+            character: Whose motions they are, by default the product's own.
+            contacts: See `MotionDatabase.gather`.
+            owed_to: `MotionDatabase.credits`.
+            threads: Threads, 0 for all cores; the graph is the same bit for bit.
+
+        Raises:
+            MotionError: There is no motion long enough, or no way is left.
+        """
+        config = config or GraphConfig()
+        character = character or default_character()
+        database = MotionDatabase.gather(
+            motions, character, config.fps, config.mirrored, contacts, owed_to
+        )
+        return cls.of(database, config, character, threads)
+
+    @classmethod
+    def of(
+        cls,
+        database: MotionDatabase,
+        config: GraphConfig | None = None,
+        character: Character | None = None,
+        threads: int = 0,
+    ) -> MotionGraph:
+        """Make a graph of a database that is at the configuration's frame rate already.
+
+        Args:
+            database: The frames.
+            config: Settings.
+            character: Whose motions they are, by default the product's own.
+            threads: Threads, 0 for all cores; the graph is the same bit for bit.
+
+        Raises:
+            MotionError: The frame rates differ, or no way is left.
+        """
+        from dynresp.locomotion.graph.pruning import find_transitions
+
+        config = config or GraphConfig()
+        if database.fps != config.fps:
+            raise MotionError(
+                f"the database has {database.fps:g} fps and the configuration {config.fps:g}; "
+                "gather the motions at that rate"
+            )
+        found = find_transitions(database, config, threads)
+        sources, targets, distances = found.sources, found.targets, found.distances
+        kept = keeps_its_feet(database, config, character or default_character(), sources, targets)
+        sources, targets, distances = sources[kept], targets[kept], distances[kept]
+        footing = len(sources)
+        inside = _largest_component(database.successors, sources, targets)
+        kept = inside[sources] & inside[targets]
+        sources, targets, distances = sources[kept], targets[kept], distances[kept]
+        if not inside.any():
+            raise MotionError(
+                "no way is left that could be walked for ever: no frame resembles another enough. "
+                "Give more motion, a larger sigma, or a smaller least_probability"
+            )
+        counts = PruningCounts(
+            frames=len(database),
+            pairs=len(database) ** 2,
+            contact=found.contact,
+            likelihood=found.likelihood,
+            similarity=found.similarity,
+            footing=footing,
+            component=len(sources),
+            component_frames=int(np.count_nonzero(inside)),
+        )
+        offsets, targets, distances = _rows(
+            database.successors, inside, sources, targets, distances
+        )
+        return cls(database, config, counts, offsets, targets, distances)
+
+    @functools.cached_property
+    def sources(self) -> IntArray:
+        """(m,) the frame from which each way leads."""
+        frames = np.arange(len(self.database), dtype=np.int32)
+        return _frozen(np.repeat(frames, np.diff(self.offsets)))
+
+    @functools.cached_property
+    def probabilities(self) -> FloatArray:
+        """(m,) of each way (eq. 1); a row adds up to 1."""
+        weights = np.exp(-self.distances.astype(np.float64) / self.config.sigma)
+        lengths = np.diff(self.offsets)
+        filled = np.flatnonzero(lengths)
+        sums = np.add.reduceat(weights, self.offsets[filled])
+        return _frozen(weights / np.repeat(sums, lengths[filled]))
+
+    @functools.cached_property
+    def cumulative(self) -> FloatArray:
+        """(m,) sums of probabilities along each row; exactly 1 at a row's end."""
+        sums = np.cumsum(self.probabilities)
+        before = np.concatenate([[0.0], sums])[self.offsets[self.sources]]
+        along = np.minimum(sums - before, 1.0)
+        along[self.offsets[1:][np.diff(self.offsets) > 0] - 1] = 1.0
+        return _frozen(along)
+
+    @functools.cached_property
+    def frames(self) -> IntArray:
+        """(k,) frames of the component, ascending."""
+        return _frozen(np.flatnonzero(np.diff(self.offsets)).astype(np.int32))
+
+    @functools.cached_property
+    def placements(self) -> FloatArray:
+        """(m, 4) where the clip of a way's target is put, seen from the clip of its source."""
+        return _frozen(self.placement_between(self.sources, self.targets))
+
+    def placement_between(self, sources: npt.ArrayLike, targets: npt.ArrayLike) -> FloatArray:
+        """Where the clip of a target is put, seen from the clip of the frame before it.
+
+        Args:
+            sources: (k,) frames left.
+            targets: (k,) frames entered.
+
+        Returns:
+            (k, 4) placements; see `dynresp.locomotion.graph.placement`. Recorded ways have zeros.
+        """
+        left, entered = np.asarray(sources), np.asarray(targets)
+        out = np.zeros((len(left), 4))
+        jumps = self.database.successors[left] != entered
+        if self.config.coordinates is Coordinates.FIXED or not jumps.any():
+            return out
+        planar = self.database.planar
+        out[jumps] = between(planar[left[jumps]], planar[entered[jumps] - 1], self.config)
+        return out
+
+
+def between(left: FloatArray, matched: FloatArray, config: GraphConfig) -> FloatArray:
+    """Placements that lay frames over others as the coordinates allow.
+
+    Args:
+        left: (k, 4) planar states that are left.
+        matched: (k, 4) planar states of the frames that are laid over them.
+        config: Says the coordinates.
+
+    Returns:
+        (k, 4).
+    """
+    if config.coordinates is Coordinates.FIXED:
+        return np.zeros((len(left), 4))
+    if config.coordinates is Coordinates.RELATIVE:
+        out = placement.compose(left, placement.inverse(matched))
+        out[:, 2] = 0.0
+        return out
+    turns = np.zeros((len(left), 4))
+    turns[:, 3] = 0.5 * np.pi * np.round((left[:, 3] - matched[:, 3]) / (0.5 * np.pi))
+    shift = left - placement.compose(turns, matched)
+    cell = np.array([config.block_m, config.block_m, config.block_height_m])
+    turns[:, :3] = np.round(shift[:, :3] / cell) * cell
+    turns[:, 3] = placement.wrapped(turns[:, 3])
+    return turns
+
+
+def keeps_its_feet(
+    database: MotionDatabase,
+    config: GraphConfig,
+    character: Character,
+    sources: IntArray,
+    targets: IntArray,
+) -> BoolArray:
+    """Which jumps ask no foot to slip through the whole blend, the paper's case 4 (section 4.1.1).
+
+    A foot that is lifted during the blend is put where it belongs next; one that stands from the
+    jump to the blend's end, as before or just landed, has no time for that: it can only slip, or
+    stay where it should not.
+
+    Args:
+        database: The frames.
+        config: Length of the blend, how far a foot may slip, and in what world it stands.
+        character: Whose feet.
+        sources: (m,) frames left.
+        targets: (m,) frames entered.
+
+    Returns:
+        (m,).
+    """
+    ends = np.array([clip.stop for clip in database.clips])[database.clip_of]
+    blend = max(1, round(config.blend_s * config.fps))
+    cases = contact_cases(database.contacts[:, :2], ends, sources, targets, blend)
+    kept = np.ones(len(sources), dtype=bool)
+    across = np.flatnonzero((cases == ContactCase.ACROSS).any(axis=1))
+    if len(across) == 0:
+        return kept
+    left, matched = sources[across], targets[across] - 1
+    moves = between(database.planar[left], database.planar[matched], config)
+    ankles = legs.ankle_positions(character, character.kinematics(database.poses))
+    turns = rotations.from_yaw(moves[:, 3])
+    for foot in range(len(FEET)):
+        there = rotations.rotate(turns, ankles[matched, foot]) + moves[:, :3]
+        apart = np.linalg.norm((there - ankles[left, foot])[:, :2], axis=1)
+        stands = cases[across, foot] == ContactCase.ACROSS
+        kept[across] &= ~(stands & (apart > config.slip_m))
+    return kept
+
+
+def _largest_component(successors: IntArray, sources: IntArray, targets: IntArray) -> BoolArray:
+    """(n,) whether a frame is in the largest strongly connected component of more than one."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(successors)
+    own = np.flatnonzero(successors >= 0)
+    rows = np.concatenate([own, sources])
+    columns = np.concatenate([successors[own], targets])
+    ways = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
+    _, labels = connected_components(ways, directed=True, connection="strong")
+    sizes = np.bincount(labels)
+    # Of components of one size the one whose frames come first.
+    largest = int(labels[np.argmax(sizes[labels] == sizes.max())])
+    return (labels == largest) & (sizes.max() > 1)
+
+
+def _rows(
+    successors: IntArray,
+    inside: BoolArray,
+    sources: IntArray,
+    targets: IntArray,
+    distances: npt.NDArray[np.float32],
+) -> tuple[npt.NDArray[np.int64], IntArray, npt.NDArray[np.float32]]:
+    """Ways laid out in rows: offsets, targets and distances; the recorded way comes first."""
+    own = np.flatnonzero(inside & (successors >= 0) & inside[successors])
+    all_sources = np.concatenate([own, sources])
+    all_targets = np.concatenate([successors[own], targets])
+    is_jump = np.arange(len(all_sources)) >= len(own)
+    order = np.lexsort((all_targets, is_jump, all_sources))
+    offsets = np.zeros(len(successors) + 1, dtype=np.int64)
+    np.cumsum(np.bincount(all_sources, minlength=len(successors)), out=offsets[1:])
+    all_distances = np.concatenate([np.zeros(len(own), dtype=np.float32), distances])
+    return offsets, all_targets[order].astype(np.int32), all_distances[order]
+
+
+def _frozen(array: npt.NDArray) -> npt.NDArray:  # type: ignore[type-arg]
+    array.flags.writeable = False
+    return array

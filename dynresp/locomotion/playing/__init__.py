@@ -1,0 +1,1 @@
+"""Walks as motion: blended, brought to a frame rate, the feet fitted."""

@@ -1,0 +1,142 @@
+"""The action that follows a sketch best: the paper's first way (Lee et al. 2002, section 5.2).
+
+An action is a cluster path of the tree at the current frame. Its most probable motion (eq. 7),
+which then stays in the last cluster by the most probable ways, tells a path over the ground, that
+of the centre of mass. The action whose path is nearest to the sketch, by dynamic time warping, is
+taken.
+
+It suits worlds that have been clustered, where there is room for a few actions, such as the step
+stool. For long paths and obstacles take `dynresp.locomotion.sketch.following`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.errors import UsageError
+from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.database import IntArray
+from dynresp.locomotion.warping import warp_onto_rows
+from dynresp.locomotion.worlds.planning import resampled
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.rotations import FloatArray
+
+# Points of a sketch that are compared with a path are so far apart [m].
+_SPACING = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class SketchedAction:
+    """An action that follows a sketch.
+
+    Attributes:
+        frames: (s,) to play after the frame at which it was chosen.
+        path: (s, 2) the centre of mass over the ground [m].
+        clusters: (p,) its cluster path.
+        cost: Sum of distances between matched points of the sketch and of the path, the least of
+            all actions [m].
+        actions: How many there were to choose from.
+    """
+
+    frames: IntArray
+    path: FloatArray
+    clusters: IntArray
+    cost: float
+    actions: int
+
+
+class SketchChooser:
+    """Chooses actions by sketch.
+
+    Attributes:
+        forest: The actions.
+        ahead_s: How long they may take [s].
+        ahead_m: How much of a sketch is looked at [m].
+    """
+
+    def __init__(
+        self,
+        forest: ClusterForest,
+        character: Character | None = None,
+        ahead_s: float = 4.0,
+        ahead_m: float = 2.5,
+    ) -> None:
+        """Prepare to choose.
+
+        Args:
+            forest: The actions.
+            character: Whose they are, by default the product's own.
+            ahead_s: How long they may take [s].
+            ahead_m: How much of a sketch is looked at [m].
+
+        Raises:
+            UsageError: A length or time is not above 0.
+        """
+        if not (ahead_s > 0.0 and ahead_m > 0.0):
+            raise UsageError(f"ahead_s and ahead_m must be above 0, got {ahead_s} and {ahead_m}")
+        self.forest = forest
+        self.ahead_s, self.ahead_m = ahead_s, ahead_m
+        character = character or default_character()
+        centers = character.kinematics(forest.graph.database.poses).centers
+        # As placements: it is moved as a root that does not turn.
+        self._centers = np.zeros((len(centers), 4))
+        self._centers[:, :3] = np.einsum("fbc,b->fc", centers, character.masses)
+        self._centers[:, :3] /= character.masses.sum()
+
+    def choose(self, frame: int, place: npt.ArrayLike, sketch: npt.ArrayLike) -> SketchedAction:
+        """The action that follows a sketch best.
+
+        Args:
+            frame: The frame the avatar is at.
+            place: (4,) where its clip is put.
+            sketch: (k, 2) corners of a path on the ground, from where the avatar is on [m].
+
+        Raises:
+            UsageError: The frame is not in the graph's component, the sketch is no path, or no
+                action is so short.
+        """
+        forest, graph = self.forest, self.forest.graph
+        points = resampled(sketch, _SPACING)[: round(self.ahead_m / _SPACING) + 1]
+        lead = forest.branch(frame)
+        left = forest.depth(self.ahead_s) - (len(lead) - 1)
+        if left < 1:
+            raise UsageError(
+                f"from frame {frame} on there is no choice within ahead_s, {self.ahead_s:g} s; "
+                "look farther ahead"
+            )
+        left_s = left / graph.database.fps
+        tree = forest.tree(frame, left_s)
+        motions, paths = [], []
+        for leaf in tree.leaves:
+            motion = forest.probable_motion(tree, int(leaf), left_s)
+            frames = np.concatenate([lead[:-1], forest.stay(motion.frames, left)])
+            motions.append(frames[1:])
+            paths.append(self._path(frames, place)[1:])
+        kept = [k for k, frames in enumerate(motions) if len(frames)]
+        if not kept:
+            raise UsageError(
+                f"from frame {frame} on there is no action within ahead_s, {self.ahead_s:g} s; "
+                "look farther ahead"
+            )
+        offsets = np.cumsum([0, *(len(paths[k]) for k in kept)], dtype=np.int64)
+        warping = warp_onto_rows(points, np.concatenate([paths[k] for k in kept]), offsets, True)
+        best = int(np.argmin(warping.costs))
+        chosen, stop = kept[best], int(warping.stops[best])
+        return SketchedAction(
+            frames=motions[chosen][:stop],
+            path=paths[chosen][:stop],
+            clusters=tree.cluster_path(int(tree.leaves[chosen])),
+            cost=float(warping.costs[best]),
+            actions=len(kept),
+        )
+
+    def _path(self, frames: IntArray, place: npt.ArrayLike) -> FloatArray:
+        """(s, 2) the centre of mass over the ground along frames."""
+        database = self.forest.graph.database
+        roots = self.forest.places_along(frames, place)
+        clips = placement.compose(roots, placement.inverse(database.planar[frames]))
+        return placement.compose(clips, self._centers[frames])[:, :2]

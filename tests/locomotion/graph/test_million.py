@@ -1,0 +1,139 @@
+"""A million frames of walks by chance: how long it takes, and how well they hang together."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynresp.graphs.building import build_graph
+from dynresp.graphs.plan import find_plan, read_plan
+from dynresp.locomotion.graph.database import IntArray
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.playing.blending import Playback
+from dynresp.locomotion.playing.composing import compose
+from dynresp.motion import rotations
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.motion import Motion
+from dynresp.motion.rotations import FloatArray
+from dynresp.motion.skating import foot_skates
+from dynresp.response.quality import joint_speed_steps
+
+pytestmark = pytest.mark.slow
+
+FRAMES, FITTED, STRETCH = 1_000_000, 50_000, 25_000
+JOINTS, ROOT, ROOT_TURN = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A graph and a walk through it."""
+
+    graph: MotionGraph
+    path: IntArray
+    walked_s: float
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param("walking", marks=pytest.mark.mocap), "builtin"]
+)
+def walk(request: pytest.FixtureRequest) -> Walk:
+    plan = find_plan(request.param)
+    folders: list[Path] = []
+    if request.param != "builtin":
+        folders = [request.getfixturevalue("motions_folder")]
+    graph = build_graph(read_plan(plan), folders, plan.parent, default_character(), lambda *_: None)
+    rng = np.random.default_rng(1)
+    random_walk(graph, 10, rng)
+    start = time.perf_counter()
+    path = random_walk(graph, FRAMES, rng)
+    return Walk(graph, path, time.perf_counter() - start)
+
+
+def speed_steps(motion: Motion) -> FloatArray:
+    """Changes of velocity at frames 1 to n - 2 (n - 2, 3).
+
+    Columns: the joint that changes most [rad/s], the root [m/s], its turning [rad/s].
+    """
+    velocities = np.diff(motion.root_positions, axis=0) * motion.fps
+    q = motion.root_quaternions
+    turns = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
+    changes = [np.diff(rows, axis=0) for rows in (velocities, turns * motion.fps)]
+    root, turn = (np.linalg.norm(rows, axis=1) for rows in changes)
+    return np.column_stack([joint_speed_steps(motion).max(axis=1), root, turn])
+
+
+def source_limits(graph: MotionGraph) -> FloatArray:
+    """(3,) 99.9th percentiles of the speed steps of what was recorded."""
+    clips = [graph.database.motion(clip) for clip in range(len(graph.database.clips))]
+    return np.percentile(np.concatenate([speed_steps(clip) for clip in clips]), 99.9, axis=0)
+
+
+def at_jumps(motion: Motion, jumps: np.ndarray) -> FloatArray:
+    """Speed steps at the frames left and at those entered."""
+    rows = np.concatenate([jumps - 2, jumps - 1])
+    steps = speed_steps(motion)
+    return steps[rows[(rows >= 0) & (rows < len(steps))]]
+
+
+def test_a_million_frames_follow_the_ways_and_never_end(walk: Walk) -> None:
+    graph, path = walk.graph, walk.path
+    n = len(graph.database)
+    ways = np.sort(graph.sources.astype(np.int64) * n + graph.targets)
+    steps = path[:-1].astype(np.int64) * n + path[1:]
+    np.testing.assert_array_equal(ways[np.searchsorted(ways, steps)], steps)
+    # It comes around: nearly every frame of the component is met.
+    assert len(np.unique(path)) > 0.9 * len(graph.frames)
+    jumps = np.mean(graph.database.successors[path[:-1]] != path[1:])
+    assert 0.05 < jumps < 0.5
+
+
+def test_a_million_frames_are_played_without_a_flaw(walk: Walk) -> None:
+    graph, path, seconds = walk.graph, walk.path, walk.walked_s
+    playback = Playback(graph, int(path[0]))
+    playback.play(path[1:2])
+    before, jumped = graph.database.poses[:0], []
+    for at in range(2, FRAMES, STRETCH):
+        start = time.perf_counter()
+        played = playback.play(path[at : at + STRETCH])
+        seconds += time.perf_counter() - start
+        assert np.isfinite(played.poses).all()
+        norms = np.linalg.norm(played.poses[:, 3:].reshape(-1, 14, 4), axis=-1)
+        np.testing.assert_allclose(norms, 1.0, atol=1e-6)
+        motion = Motion(np.concatenate([before, played.poses]), graph.config.fps, "")
+        # Nobody flies off or sinks into the ground.
+        assert np.linalg.norm(np.diff(motion.root_positions, axis=0), axis=1).max() < 0.5
+        heights = motion.root_positions[:, 2]
+        assert 0.3 < heights.min() <= heights.max() < 1.3
+        jumped.append(at_jumps(motion, np.flatnonzero(played.jumps) + len(before)))
+        before = played.poses[-3:]
+    assert FRAMES / seconds > 100_000
+    below = np.mean(np.concatenate(jumped) <= source_limits(graph), axis=0)
+    assert below[JOINTS] > 0.997
+    assert below[ROOT] > 0.99
+    assert below[ROOT_TURN] > 0.99
+
+
+def test_feet_are_fitted_fast_and_stand(walk: Walk, character: Character) -> None:
+    graph = walk.graph
+    compose(graph, character, walk.path[:100])
+    seconds, jumped, slides, before = 0.0, [], [], []
+    for at in range(0, FITTED, STRETCH):
+        start = time.perf_counter()
+        made = compose(graph, character, walk.path[at : at + STRETCH])
+        seconds += time.perf_counter() - start
+        assert np.isfinite(made.motion.poses).all()
+        jumped.append(at_jumps(made.motion, made.jumps))
+        slides += foot_skates(made.motion, character)
+        played = Motion(made.sliding, graph.config.fps, "", made.motion.contacts)
+        before += foot_skates(played, character)
+    assert FITTED / seconds > 2_000
+    assert np.mean(np.array(before) < 0.01) < 0.1
+    assert np.mean(np.array(slides) < 0.01) > 0.99
+    assert np.median(slides) < 1e-3
+    below = np.mean(np.concatenate(jumped) <= source_limits(graph), axis=0)
+    assert below[JOINTS] > 0.99
+    assert below[ROOT] > 0.99
+    assert below[ROOT_TURN] > 0.99
