@@ -63,11 +63,11 @@ def test_base_motions_and_every_strategy_are_there() -> None:
 
 
 def test_all_are_made_quickly(character: Character) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     for name in NAMES:
         make_motion(read_spec(builtin_folder() / f"{name}.toml"), character)
-    # Under 1 s on an idle machine.
-    assert time.perf_counter() - start < 4.0
+    # About 1 s; of the processor, so that other work on the machine does not count.
+    assert time.process_time() - start < 4.0
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -24,7 +24,7 @@ import numpy as np
 
 from dynresp.motion import rotations
 from dynresp.motion.builtin.course_feet import foot_track
-from dynresp.motion.builtin.course_plan import FULL_STEP, GRAVITY, Plan, plan_course
+from dynresp.motion.builtin.course_plan import FULL_STEP, GRAVITY, CoursePlan, plan_course
 from dynresp.motion.builtin.footing import FootTrack, Sole, place_feet
 from dynresp.motion.builtin.keypose_spec import BuiltinSpec
 from dynresp.motion.builtin.keyposes import add_sway, channel_poses, frame_times
@@ -151,7 +151,7 @@ def _within_reach(
 
 
 def _channels(
-    plan: Plan, tracks: Sequence[FootTrack], times: FloatArray, fps: float
+    plan: CoursePlan, tracks: Sequence[FootTrack], times: FloatArray, fps: float
 ) -> dict[str, FloatArray]:
     """What the body does, the pelvis's place apart."""
     channels = {name: np.zeros(len(times)) for name in CHANNELS}
@@ -190,7 +190,7 @@ def _point_knees(channels: dict[str, FloatArray], tracks: Sequence[FootTrack]) -
         channels[f"{side}_hip.rotation"] += 0.5 * outward * toes
 
 
-def _heights(plan: Plan, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _heights(plan: CoursePlan, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Height of the pelvis (frames,) [m], through the plan's, and its acceleration [m/s^2]."""
     from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 

@@ -97,7 +97,7 @@ class Footfall:
 
 
 @dataclass
-class Plan:
+class CoursePlan:
     """What has to be where and when; see the module.
 
     Attributes:
@@ -120,7 +120,7 @@ class Plan:
     duration: float = 0.0
 
 
-def plan_course(course: Course) -> Plan:
+def plan_course(course: Course) -> CoursePlan:
     """Work out the plan of a course."""
     planner = _Planner(course)
     for name in course.route:
@@ -144,7 +144,7 @@ class _Planner:
         x, y, facing = course.start
         self.body = Place(x, y, 0.0, math.radians(facing))
         first = [[Footfall(self._beside(i, _APART), 0.0, 0.0)] for i in range(2)]
-        self.plan = Plan((first[0], first[1]))
+        self.plan = CoursePlan((first[0], first[1]))
         self.time = 0.0
         self.next = 0
         self.stood = True
@@ -248,7 +248,7 @@ class _Planner:
         self.plan.headings.append((self.time, self.body.yaw))
         self.stood = True
 
-    def finished(self) -> Plan:
+    def finished(self) -> CoursePlan:
         for falls in self.plan.feet:
             falls[-1] = dataclasses.replace(falls[-1], leave=math.inf)
         self.plan.duration = self.time

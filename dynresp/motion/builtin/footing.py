@@ -257,15 +257,18 @@ def rest_on_ground(
     placed: FloatArray,
     lying: Sequence[Lying],
     fps: float,
+    propped: npt.NDArray[np.bool_],
 ) -> FloatArray:
     """Raise the character where it is in the ground; where it lies, also lower it onto it.
 
     Args:
         character: The character.
         poses: (frames, 59) to correct.
-        placed: The same with the feet placed, whose bodies are looked at.
+        placed: The same with feet and hands placed, whose bodies are looked at.
         lying: When the lowest body touches the ground.
         fps: Frame rate [1/s].
+        propped: (frames, 2) whether the left and the right hand are led over the ground; it is
+            the rest of the body then that lies on it.
 
     Returns:
         (frames, 59), with another height of the root.
@@ -273,7 +276,10 @@ def rest_on_ground(
     from scipy.ndimage import gaussian_filter1d
 
     trunk_and_limbs = [i for i, name in enumerate(character.body_names) if "foot" not in name]
-    height = ground.clearances(character, character.kinematics(placed))[:, trunk_and_limbs].min(1)
+    heights = ground.clearances(character, character.kinematics(placed))
+    for i, side in enumerate(FEET):
+        heights[propped[:, i], character.body(f"{side}_forearm")] = np.inf
+    height = heights[:, trunk_and_limbs].min(axis=1)
     times = np.arange(len(poses)) / fps
     share = np.zeros(len(poses))
     for span in lying:

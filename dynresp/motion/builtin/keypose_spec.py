@@ -27,7 +27,7 @@ from dynresp.motion.builtin.posture_spec import (
 )
 from dynresp.motion.strategies import Strategy
 
-Kind = Literal["walk", "idle", "guard", "punch", "locomotion", "reaction"]
+Kind = Literal["walk", "idle", "guard", "punch", "locomotion", "reaction", "get_up"]
 
 MAX_DURATION = 120.0
 """Longest motion that a file may describe [s]."""
@@ -45,6 +45,13 @@ class Key(Posture):
     """A key pose: the posture at one time."""
 
     time: Time
+
+
+def _point(data: Any) -> Any:
+    """TOML has lists only; strict mode wants the pair as a tuple."""
+    if isinstance(data, dict) and isinstance(data.get("at"), list):
+        return data | {"at": tuple(data["at"])}
+    return data
 
 
 class _Span(Strict):
@@ -84,19 +91,27 @@ class Stance(_Span):
     by: Literal["step", "free"] = "step"
     lift: Annotated[float, Field(ge=0.0, le=0.6)] = 0.05
 
-    @model_validator(mode="before")
-    @classmethod
-    def _point(cls, data: Any) -> Any:
-        """TOML has lists only; strict mode wants the pair as a tuple."""
-        if isinstance(data, dict) and isinstance(data.get("at"), list):
-            return data | {"at": tuple(data["at"])}
-        return data
+    _point = model_validator(mode="before")(_point)
 
 
 class Lying(_Span):
     """A time during which the body rests on the ground: its lowest point touches the floor."""
 
     ease: Annotated[float, Field(gt=0.0, le=1.0)] = 0.12
+
+
+class Prop(_Span):
+    """A hand that presses on the ground in one place.
+
+    Attributes:
+        hand: Which.
+        at: Where its tip is over the ground: x, y [m].
+    """
+
+    hand: Side
+    at: tuple[Place, Place]
+
+    _point = model_validator(mode="before")(_point)
 
 
 class Sway(Strict):
@@ -177,6 +192,7 @@ class BuiltinSpec(Strict):
     key: list[Key] = Field(default_factory=list)
     stance: list[Stance] = Field(default_factory=list)
     lying: list[Lying] = Field(default_factory=list)
+    prop: list[Prop] = Field(default_factory=list)
     sway: list[Sway] = Field(default_factory=list)
     gait: Gait | None = None
     curves: Curves | None = None
@@ -192,12 +208,14 @@ class BuiltinSpec(Strict):
         if (self.kind == "locomotion") != (self.course is not None):
             raise ValueError("[course] belongs to kind 'locomotion', and only to it")
         if self.course is not None:
-            if self.gait or self.rest or self.key or self.stance or self.lying:
+            if self.gait or self.rest or self.key or self.stance or self.lying or self.prop:
                 raise ValueError("a file with [course] takes [[sway]] besides, and nothing else")
             return self
         if self.gait is not None:
-            if self.key or self.stance or self.lying:
-                raise ValueError("a file with [gait] takes no [[key]], [[stance]] or [[lying]]")
+            if self.key or self.stance or self.lying or self.prop:
+                raise ValueError(
+                    "a file with [gait] takes no [[key]], [[stance]], [[lying]] or [[prop]]"
+                )
             return self
         if self.rest is not None:
             raise ValueError("[rest] belongs to a file with [gait]; use a [[key]] instead")
@@ -215,7 +233,9 @@ class BuiltinSpec(Strict):
         return self
 
     def _check_spans(self, end: float) -> None:
-        spans = [("lying", x) for x in self.lying] + [(x.foot, x) for x in self.stance]
+        spans: list[tuple[str, _Span]] = [("lying", x) for x in self.lying]
+        spans += [(x.foot, x) for x in self.stance]
+        spans += [(f"{x.hand} hand", x) for x in self.prop]
         last: dict[str, float] = {}
         for what, span in spans:
             if span.stop > end:
@@ -262,6 +282,7 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "rest": Key,
     "stance": Stance,
     "lying": Lying,
+    "prop": Prop,
     "sway": Sway,
     "gait": Gait,
     "curves": Curves,

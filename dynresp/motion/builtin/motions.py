@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from dynresp.motion.builtin.keypose_spec import BuiltinSpec
     from dynresp.motion.rotations import FloatArray
 
+# How often a body that gets up over knees and hands is set onto the ground.
+_SETTLED = 6
+
 PREFIX = "built-in: "
 """How the name of a built-in motion begins."""
 FLAT = ("walk", "stroll", "footwork")
@@ -39,8 +42,8 @@ class BuiltinInfo:
     Attributes:
         slug: What `load_builtin` takes: its file's name without ".toml".
         name: For people.
-        kind: "walk", "idle", "guard", "punch" or "locomotion" for base motions, "reaction" for the
-            others.
+        kind: "walk", "idle", "guard", "punch" or "locomotion" for base motions, "get_up" for what
+            follows a fall, "reaction" for the others.
         strategy: Of a reaction, such as "side_fall"; None for a base motion.
         what: What happens in it.
         source: Where its numbers come from; empty where they were made up by hand.
@@ -98,19 +101,21 @@ def make_motion(spec: BuiltinSpec, character: Character) -> Motion:
     """Turn a file's contents into a motion."""
     poses, tracks = make_poses(spec, character)
     name = PREFIX + spec.name
+    planned = np.stack([track.locked for track in tracks], axis=1)
     if spec.course is not None:
         # Not all of its feet stand on the floor z = 0, and where they stand is planned.
-        planned = np.stack([track.locked for track in tracks], axis=1)
         return Motion(poses, spec.fps, name, planned, _phrases(spec.course, spec.fps, len(poses)))
-    states = character.kinematics(poses)
-    contacts = ground.foot_contacts(character, states, spec.fps)
     label = Label(spec.strategy or spec.kind, 0, len(poses))
+    if spec.kind == "get_up":
+        # Feet of one who lies touch the floor without standing on it.
+        return Motion(poses, spec.fps, name, planned, (label,))
+    contacts = ground.foot_contacts(character, character.kinematics(poses), spec.fps)
     return Motion(poses, spec.fps, name, contacts, (label,))
 
 
 def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
     """Poses (frames, 59) of a file, and where its left and right foot were to be."""
-    from dynresp.motion.builtin import course, footing, gait, keyposes
+    from dynresp.motion.builtin import course, footing, gait, hands, keyposes
 
     if spec.course is not None:
         return course.course_poses(spec, character)
@@ -123,11 +128,15 @@ def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, lis
         stances = [stance for stance in spec.stance if stance.foot == side]
         sole = footing.Sole.of(character, side)
         tracks.append(footing.stance_track(stances, sole, times, outward))
-    # Twice: raising the root changes how the legs bend, and so what is lowest.
-    for _ in range(2):
+    led = hands.hand_tracks(spec.prop, character, times)
+    propped = np.stack([track.weights > 0.0 for track in led], axis=1)
+    # Again: raising the root changes how the legs bend, and so what is lowest.
+    for _ in range(_SETTLED if spec.prop else 2):
         placed = footing.place_feet(character, poses, tracks, spec.fps)
-        poses = footing.rest_on_ground(character, poses, placed, spec.lying, spec.fps)
-    return footing.place_feet(character, poses, tracks, spec.fps), tracks
+        placed = hands.place_hands(character, placed, led)
+        poses = footing.rest_on_ground(character, poses, placed, spec.lying, spec.fps, propped)
+    placed = footing.place_feet(character, poses, tracks, spec.fps)
+    return hands.place_hands(character, placed, led), tracks
 
 
 def _phrases(course: Course, fps: float, frames: int) -> tuple[Label, ...]:
