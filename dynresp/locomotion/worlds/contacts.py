@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion import rotations
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.ground import ContactConfig, sole_points
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
-
-BoolArray = npt.NDArray[np.bool_]
 
 Ground: TypeAlias = Callable[[FloatArray], FloatArray]
 """Height [m] of the ground at points (..., 2): (...); not a number where there is none."""
@@ -26,8 +25,9 @@ Ground: TypeAlias = Callable[[FloatArray], FloatArray]
 # Part of the way from a sole's middle to its corners at which the ground beneath it is looked up. A
 # toe may stick out over an edge, or seem to reach into the next block by what the grid is wrong.
 _INNER = 0.5
-# What a hand closes about, in the forearm's frame [m]: the middle of the model file's hand.
-_PALM = np.array([0.0, 0.0, -0.35])
+PALM = np.array([0.0, 0.0, -0.35])
+"""The middle of a hand, which closes about things, in the forearm's frame [m]."""
+PALM.flags.writeable = False
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def palms(character: Character, states: BodyStates) -> FloatArray:
     for side in FEET:
         arm = character.body(f"{side}_forearm")
         columns.append(
-            states.positions[:, arm] + rotations.rotate(states.quaternions[:, arm], _PALM)
+            states.positions[:, arm] + rotations.rotate(states.quaternions[:, arm], PALM)
         )
     return np.stack(columns, axis=1)
 

@@ -16,12 +16,11 @@ import numpy.typing as npt
 
 from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.contacts import palms, sole_corners, speeds, steady
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import Character
 from dynresp.motion.ground import ContactConfig
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-
-BoolArray = npt.NDArray[np.bool_]
 
 # (name, one end, the other end) of each bar [m], in the world of the motions as they are loaded
 # with flat_floor=False: the ground is at height 0.
@@ -74,12 +73,16 @@ class Bar:
     stop: tuple[float, float, float]
     radius: float = 0.02
 
-    def distance(self, points: npt.ArrayLike) -> FloatArray:
-        """Distance [m] of points (..., 3) from its axis, (...)."""
+    def closest(self, points: npt.ArrayLike) -> FloatArray:
+        """The point of its axis that is closest to each of the points (..., 3) [m]."""
         start, along = np.array(self.start), np.subtract(self.stop, self.start)
         away = np.asarray(points, dtype=np.float64) - start
         share = np.clip(away @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(away - share[..., None] * along, axis=-1))
+        return np.asarray(start + share[..., None] * along)
+
+    def distance(self, points: npt.ArrayLike) -> FloatArray:
+        """Distance [m] of points (..., 3) from its axis, (...)."""
+        return np.asarray(np.linalg.norm(self.closest(points) - np.asarray(points), axis=-1))
 
 
 @dataclass(frozen=True)
