@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dynresp.cli.graph_info import Graph
-from dynresp.cli.graph_walk import USUAL_FPS, Fps, Out, Video, finish
 from dynresp.cli.options import Json, Seed
+from dynresp.cli.outing import USUAL_FPS, Fps, Out, Video, finish
 from dynresp.cli.progress import progress
 from dynresp.cli.run import check_folder
 
@@ -76,8 +76,7 @@ def sketch(
     boxes = None if world is None else read_world(world)
     check_folder(out)
     with progress() as tell:
-        tell("looking for a way", 0, 1)
-        outing = sketch_outing(loaded, default_character(), asked, boxes, fps)
+        outing = sketch_outing(loaded, default_character(), asked, boxes, fps, tell)
     finish(out, loaded, outing, video, as_json)
 
 
@@ -102,10 +101,8 @@ def read_points(text: str | None, file: Path | None) -> FloatArray | None:
 # Largest file of corners that is read [bytes]; and how far corners may be away [m].
 _MOST_BYTES = 1 << 20
 _FARTHEST = 10_000.0
-# Most corners of a path; and how long it may be [m]: to walk a kilometre takes a quarter of an
-# hour, and what is looked at around it between obstacles about 1 GB.
+# Most corners of a path.
 _MOST_CORNERS = 10_000
-_LONGEST = 1_000.0
 
 
 def _lines(file: Path) -> list[str]:
@@ -133,6 +130,7 @@ def _corners(words: list[str], where: str) -> FloatArray:
     import numpy as np
 
     from dynresp.errors import UsageError
+    from dynresp.locomotion.worlds.paths import check_length
 
     if len(words) > _MOST_CORNERS:
         raise UsageError(
@@ -140,11 +138,7 @@ def _corners(words: list[str], where: str) -> FloatArray:
             "leave out corners that lie near to each other"
         )
     points = np.array([one_point(word, where) for word in words]).reshape(-1, 2)
-    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    if length > _LONGEST:
-        raise UsageError(
-            f"{where}: a path {length:g} m long; at most {_LONGEST:g} m are allowed, so cut it"
-        )
+    check_length(points, f"{where}: the path")
     return points
 
 

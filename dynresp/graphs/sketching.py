@@ -10,16 +10,19 @@ from dynresp.errors import DynrespError, UsageError
 from dynresp.graphs.asked import Asked
 from dynresp.graphs.outing import Outing
 from dynresp.graphs.terrain_outing import terrain_outing
-from dynresp.graphs.worlds import TERRAIN
+from dynresp.graphs.worlds import TERRAIN, blocks_of
 from dynresp.locomotion.graph.config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.composing import compose
-from dynresp.locomotion.sketch.following import SketchedWalk, follow_sketch, reach
-from dynresp.locomotion.sketch.search import SearchGraph, State
+from dynresp.locomotion.playing.state import State
+from dynresp.locomotion.sketch.following import follow_sketch, reach
+from dynresp.locomotion.sketch.search import SearchGraph
+from dynresp.locomotion.sketch.walking import SketchedWalk
 from dynresp.locomotion.worlds.maze import random_maze
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion.character import Character
-from dynresp.view.story import Block, GroundPath
+from dynresp.progress import Progress
+from dynresp.view.story import GroundPath
 
 
 def sketch_outing(
@@ -28,6 +31,7 @@ def sketch_outing(
     asked: Asked,
     world: World | None = None,
     fps: float = 30.0,
+    progress: Progress | None = None,
 ) -> Outing:
     """Walk along a sketch.
 
@@ -37,6 +41,7 @@ def sketch_outing(
         asked: Where to.
         world: Obstacles.
         fps: Frame rate of the motion [1/s].
+        progress: Told the stage, how much is done, and of how much.
 
     Raises:
         UsageError: What was asked contradicts itself or lacks something.
@@ -77,10 +82,10 @@ def sketch_outing(
     search = SearchGraph(graph, character)
     state = standing_at(graph, start, path[1] if path is not None else goal)
     if path is not None:
-        walk = follow_sketch(search, state, path, world)
+        walk = follow_sketch(search, state, path, world, progress=progress)
     else:
         assert goal is not None
-        walk = reach(search, state, goal, world)
+        walk = reach(search, state, goal, world, progress=progress)
     if len(walk.frames) < 2:
         raise DynrespError(
             f"there is no way on from {start[0]:g},{start[1]:g}: every one would touch an obstacle "
@@ -89,7 +94,8 @@ def sketch_outing(
     composition = compose(graph, character, walk.frames, walk.placements[0], fps)
     drawn = [] if path is None else [GroundPath("sketch", path)]
     if path is None or world is not None:
-        drawn.append(GroundPath("path between the obstacles", walk.path))
+        found = "way to the goal" if world is None else "way between the obstacles"
+        drawn.append(GroundPath(found, walk.path))
     mean = float(walk.off_path.mean())
     seconds = (len(walk.frames) - 1) / graph.config.fps
     return Outing.of(
@@ -98,8 +104,9 @@ def sketch_outing(
         title="A walk along a sketch" if path is not None else "A walk to a goal",
         subtitle=f"{'arrived' if walk.arrived else 'did not arrive'}, on average {mean:.2f} m off "
         "the path",
-        blocks=blocks_of(world),
+        blocks=blocks_of(world, walk.roots[:, :2]),
         paths=drawn,
+        bounds=None if world is None else world.bounds,
         arrived=walk.arrived,
         about={"sketch": _about(walk, seconds), "maze": asked.seed if asked.maze else None},
     )
@@ -134,16 +141,6 @@ def _refuse_inside(world: World, place: tuple[float, float], what: str) -> None:
             f"{what}, {place[0]:g},{place[1]:g}, is in an obstacle or beyond the bounds "
             f"{world.bounds}; choose another"
         )
-
-
-def blocks_of(world: World | None) -> list[Block]:
-    """The boxes of a world as they are shown."""
-    if world is None:
-        return []
-    return [
-        Block((*box.center, 0.5 * box.height), (*box.half_sizes, 0.5 * box.height), yaw=box.yaw)
-        for box in world.obstacles
-    ]
 
 
 def _about(walk: SketchedWalk, seconds: float) -> dict[str, Any]:

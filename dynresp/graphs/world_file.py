@@ -1,21 +1,18 @@
-"""World files: boxes on level ground, for avatars to walk around (`docs/locomotion.md`)."""
+"""World files: boxes on level ground, for avatars to walk around (`docs/worlds.md`)."""
 
 from __future__ import annotations
 
 import math
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 
 from dynresp.errors import SpecError, UsageError
-from dynresp.experiments.mistakes import explain_in_tables, read_toml, validate
+from dynresp.experiments.mistakes import Layout, read_toml, validate
 from dynresp.experiments.spec import Strict
 from dynresp.experiments.values import fixed, shown
-from dynresp.locomotion.worlds.obstacles import Obstacle, World
-
-_MOST_BOXES = 10_000
+from dynresp.locomotion.worlds.obstacles import MOST_BOXES, Obstacle, World
 
 
 def _numbers(count: int, unit: str) -> BeforeValidator:
@@ -51,14 +48,13 @@ class WorldFile(Strict):
     """A whole file."""
 
     world: WorldTable
-    box: Annotated[list[BoxTable], Field(default_factory=list, max_length=_MOST_BOXES)]
+    box: Annotated[list[BoxTable], Field(default_factory=list, max_length=MOST_BOXES)]
 
 
-_TABLES: dict[tuple[str, ...], type[BaseModel]] = {
-    (): WorldFile,
-    ("world",): WorldTable,
-    ("box",): BoxTable,
-}
+_LAYOUT = Layout(
+    tables={(): WorldFile, ("world",): WorldTable, ("box",): BoxTable},
+    hints={"world": "add [world] with bounds"},
+)
 
 
 def read_world(path: Path | str) -> World:
@@ -72,7 +68,7 @@ def read_world(path: Path | str) -> World:
             allowed. The message names the file, the key, what was given and what is allowed.
     """
     content = read_toml(Path(path), "a world file")
-    said = validate(WorldFile, content, str(path), partial(_explain, content=content))
+    said = validate(WorldFile, content, str(path), _LAYOUT)
     try:
         boxes = [
             Obstacle(
@@ -86,8 +82,3 @@ def read_world(path: Path | str) -> World:
         return World(said.world.bounds, tuple(boxes))
     except UsageError as error:
         raise SpecError(f"{path}: {error}") from None
-
-
-def _explain(error: dict[str, Any], content: dict[str, Any]) -> str:
-    """One mistake in words: where, what was given, what is allowed."""
-    return explain_in_tables(error, content, _TABLES, {"world": "add [world] with bounds"})

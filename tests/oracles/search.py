@@ -13,7 +13,8 @@ import numpy as np
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.sketch.search import SearchConfig, State
+from dynresp.locomotion.playing.state import State
+from dynresp.locomotion.sketch.search import SearchConfig
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
@@ -111,17 +112,20 @@ class Search:
         self.target, self.config, self.crowded = target, config, crowded
 
     def nearest(self, point: FloatArray, progress: float) -> tuple[float, float]:
-        """The nearest place of the path not far from a progress, and its distance."""
+        """The nearest place of the path from a progress on, not far ahead, and its distance."""
         last = len(self.path) - 1
-        first = min(max(int(progress) - 2, 0), last - 1)
-        found = []
-        for k in range(first, max(min(int(progress) + 8, last), first + 1)):
+        first = min(int(progress), last - 1)
+        window = math.ceil(max(0.4, 6.0 / self.graph.database.fps) / self.spacing)
+        nearest, at = math.inf, progress
+        for k in range(first, min(first + window, last)):
             along = self.path[k + 1] - self.path[k]
-            share = float(np.clip((point - self.path[k]) @ along / self.spacing**2, 0, 1))
+            share = float(np.clip((point - self.path[k]) @ along / (along @ along), 0, 1))
+            share = max(share, min(progress - k, 1.0))
             away = float(np.linalg.norm(point - self.path[k] - share * along))
-            found.append((away, k + share))
-        away, at = min(found, key=lambda pair: pair[0])
-        return at, away
+            # Of places that are alike the first one counts.
+            if away**2 < nearest**2 - 1e-9:
+                nearest, at = away, k + share
+        return at, nearest
 
     def objective(self, root: FloatArray, progress: float, away: float) -> float:
         """Eq. 8 with the way left as the distance."""

@@ -7,12 +7,12 @@ and feet that need not be drawn in.
 import numpy as np
 
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import BoolArray
-from dynresp.locomotion.sketch.search import State
+from dynresp.locomotion.playing.state import State
 from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.motion import rotations
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.rotations import FloatArray
 
 

@@ -19,9 +19,9 @@ import numpy.typing as npt
 from dynresp.errors import UsageError
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.warping import warp_onto_rows
-from dynresp.locomotion.worlds.planning import resampled
+from dynresp.locomotion.worlds.paths import resampled
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
 

@@ -2,110 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import DynrespError, UsageError
-from dynresp.locomotion.graph import placement
-from dynresp.locomotion.sketch.search import Found, IntArray, SearchConfig, SearchGraph, State
-from dynresp.locomotion.worlds.collisions import CollisionGrid
+from dynresp.errors import UsageError
+from dynresp.locomotion.playing.state import State
+from dynresp.locomotion.sketch.search import SearchGraph
+from dynresp.locomotion.sketch.walking import SPACING, Follower, SketchConfig, SketchedWalk
 from dynresp.locomotion.worlds.obstacles import World
-from dynresp.locomotion.worlds.planning import PlanningConfig, fit_path, plan_path, resampled
+from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled
+from dynresp.locomotion.worlds.planning import fit_path, plan_path
 from dynresp.motion.rotations import FloatArray
-
-# Distance of the points of the path that is walked along [m].
-_SPACING = 0.1
-# The most states that are looked at in one neighbourhood.
-_CROWDED = 12
-# How many times the budget is spent on coming near to where no way leads.
-_MORE = 16
-# Where nothing is found the search begins anew: how far back [s], with how many times the budget,
-# with costs counted how many times less, and with how many states in a neighbourhood. What has a
-# way at all is found soonest by looking first at what is nearest to the goal, whatever it has cost;
-# that is also how narrow passages are found, before which there is a lot to try that costs less
-# than turning sideways.
-_AGAIN = (
-    (0.0, 16, 1.0, 12),
-    (0.0, 16, 3.0, 12),
-    (2.0, 16, 10.0, 40),
-    (4.0, 16, 10.0, 40),
-    (2.0, 160, 10.0, 40),
-    (4.0, 160, 10.0, 120),
-    (8.0, 160, 30.0, 120),
-)
-# A place where that did not help either is closed with a disc of this radius [m], at most so often.
-_CLOSED_M, _MOST_CLOSED = 0.3, 4
-# How far from a narrow place it does not count where the avatar faces [m].
-_NARROW_M = 0.8
-# Poses reach farther from their root by at most this when blended [m].
-_BLENDED_REACH_M = 0.5
-
-
-@dataclass(frozen=True)
-class SketchConfig:
-    """How a sketch is followed.
-
-    Attributes:
-        search: What a good way is.
-        planning: What a good path between obstacles is.
-        horizon_m: How far ahead along the path a way is looked for [m].
-        commit_s: How much of it is played before the next one is looked for [s].
-        budget: Most ways that are looked at each time.
-        arrival_m: How near to its end the avatar must come [m].
-        stop: Whether it must stand there; otherwise it may be walking.
-
-    Raises:
-        UsageError: A number makes no sense.
-    """
-
-    search: SearchConfig = field(default_factory=SearchConfig)
-    planning: PlanningConfig = field(default_factory=PlanningConfig)
-    horizon_m: float = 2.5
-    commit_s: float = 1.0
-    budget: int = 4000
-    arrival_m: float = 0.25
-    stop: bool = False
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for name in ("horizon_m", "commit_s", "budget", "arrival_m"):
-            if not getattr(self, name) > 0:
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
-
-
-@dataclass(frozen=True, eq=False)
-class SketchedWalk:
-    """A walk along a sketch.
-
-    Attributes:
-        frames: (k,) the walk, beginning with the frame of the start.
-        placements: (k, 4) of their clips.
-        roots: (k, 4) x, y, z [m] and yaw [rad] of the root.
-        path: (p, 2) what was walked along: the sketch, bent around obstacles [m].
-        off_path: (k,) distance of the root to it [m].
-        arrived: Whether the end was reached.
-        looked: Ways that the searches have looked at.
-        collided: Those dropped for a collision.
-        backtracks: How often a stretch was taken back because it led nowhere.
-        detours: How often a place was closed because there is no getting through.
-        planning_s: Time that the planning took [s].
-    """
-
-    frames: IntArray
-    placements: FloatArray
-    roots: FloatArray
-    path: FloatArray
-    off_path: FloatArray
-    arrived: bool
-    looked: int
-    collided: int
-    backtracks: int
-    detours: int
-    planning_s: float
+from dynresp.progress import Progress
 
 
 def follow_sketch(
@@ -114,6 +22,7 @@ def follow_sketch(
     sketch: npt.ArrayLike,
     world: World | None = None,
     config: SketchConfig | None = None,
+    progress: Progress | None = None,
 ) -> SketchedWalk:
     """Walk along a sketch, by incremental best-first search: the paper's second way.
 
@@ -125,27 +34,30 @@ def follow_sketch(
     Args:
         graph: Where the avatar walks through.
         start: Where it is. Its path begins there even if the sketch does not.
-        sketch: (k, 2) corners of a path on the ground [m].
+        sketch: (k, 2) corners of a path on the ground, at most 1 km with the way there [m].
         world: Obstacles; None for open ground.
         config: How it is followed.
+        progress: Told how far it is.
 
     Raises:
-        UsageError: The sketch is none, or the start is not in the graph's component.
+        UsageError: The sketch is none or too long, or the start is not in the graph's component.
         DynrespError: There is no way between the obstacles.
     """
-    config = config or SketchConfig()
-    root = start.root(graph.graph)[:2]
-    points = np.asarray(sketch, dtype=np.float64)
-    points = resampled(points, _SPACING)
-    if np.hypot(*(points[0] - root)) > 2.0 * _SPACING:
-        points = np.concatenate([root[None], points])
+    _check_kinds(graph, start, world, config)
+    follower = Follower(graph, start, world, config, progress)
+    config, root = follower.config, follower.begin
+    corners = as_path(sketch, "a sketch")
+    if np.hypot(*(corners[0] - root)) > 2.0 * SPACING:
+        corners = np.concatenate([root[None], corners])
+    check_length(corners, "the sketch, from where the avatar is on,")
+    points = resampled(corners, SPACING)
 
     def path_from(closed: FloatArray) -> FloatArray:
         if world is None:
             return points
         return fit_path(world, points, config.planning, closed)
 
-    return _Follower(graph, start, world, config).walk(path_from)
+    return follower.walk(path_from)
 
 
 def reach(
@@ -154,218 +66,50 @@ def reach(
     goal: npt.ArrayLike,
     world: World | None = None,
     config: SketchConfig | None = None,
+    progress: Progress | None = None,
 ) -> SketchedWalk:
     """Walk to a place: a planned path serves as the sketch.
 
     Args:
         graph: Where the avatar walks through.
         start: Where it is.
-        goal: (2,) the place [m].
+        goal: (2,) the place, at most 1 km away [m].
         world: Obstacles; None for open ground.
         config: How the path is followed.
+        progress: Told how far it is.
 
     Raises:
-        UsageError: The start is not in the graph's component.
+        UsageError: The goal is none or too far away, or the start is not in the graph's component.
         DynrespError: There is no way between the obstacles.
     """
-    config = config or SketchConfig()
-    root = start.root(graph.graph)[:2]
-    end = np.asarray(goal, dtype=np.float64)
-    if end.shape != (2,) or not np.isfinite(end).all():
-        raise UsageError(f"a goal must be two finite numbers, x and y, got {end.tolist()}")
+    _check_kinds(graph, start, world, config)
+    follower = Follower(graph, start, world, config, progress)
+    config, root = follower.config, follower.begin
+    end = as_place(goal, "a goal")
+    check_length(np.stack([root, end]), "the straight way to the goal")
 
     def path_from(closed: FloatArray) -> FloatArray:
         if world is None:
             return np.stack([root, end])
         return plan_path(world, root, end, config.planning, closed)
 
-    return _Follower(graph, start, world, config).walk(path_from)
+    return follower.walk(path_from)
 
 
-@dataclass(frozen=True, eq=False)
-class _Joint:
-    """A place in a walk from which it may be planned anew.
+def _check_kinds(
+    graph: SearchGraph, start: State, world: World | None, config: SketchConfig | None
+) -> None:
+    """Refuse what is something else.
 
-    Attributes:
-        state: Where the avatar is.
-        progress: How much of the path is done [points].
-        played: How many frames of the walk.
+    Raises:
+        UsageError: Something is; the message says how the right one is made.
     """
-
-    state: State
-    progress: float
-    played: int
-
-
-class _Follower:
-    """A walk in the making."""
-
-    def __init__(
-        self, graph: SearchGraph, start: State, world: World | None, config: SketchConfig
-    ) -> None:
-        self.graph, self.start, self.world, self.config = graph, start, world, config
-        self.fps = graph.graph.database.fps
-        self.grid: CollisionGrid | None = None
-        if world is not None:
-            self.grid = CollisionGrid.of(world, graph.reach_m + _BLENDED_REACH_M)
-        self.looked = self.collided = self.backtracks = 0
-
-    def walk(self, path_from: Callable[[FloatArray], FloatArray]) -> SketchedWalk:
-        """Walk along a path that is planned around closed discs (n, 3)."""
-        began = time.perf_counter()
-        closed = np.zeros((0, 3))
-        path = _long_enough(path_from(closed))
-        arrived, stuck = self._along(path)
-        while not arrived and self.world is not None and len(closed) < _MOST_CLOSED:
-            ahead = path[int(stuck) : int(stuck + self.config.horizon_m / _SPACING) + 1]
-            narrowest = ahead[np.argmin(self.world.distances(ahead))]
-            closed = np.concatenate([closed, [[*narrowest, _CLOSED_M]]])
-            try:
-                path = _long_enough(path_from(closed))
-            except DynrespError:
-                break
-            arrived, stuck = self._along(path)
-        if not arrived:
-            self._come_near()
-        frames, placements = self.frames, self.placements
-        roots = placement.compose(placements, self.graph.graph.database.planar[frames])
-        return SketchedWalk(
-            frames=frames,
-            placements=placements,
-            roots=roots,
-            path=path,
-            off_path=distances_to(path, roots[:, :2]),
-            arrived=arrived,
-            looked=self.looked,
-            collided=self.collided,
-            backtracks=self.backtracks,
-            detours=len(closed),
-            planning_s=time.perf_counter() - began,
-        )
-
-    def _along(self, path: FloatArray) -> tuple[bool, float]:
-        """Walk from the start along a path; whether its end was reached, and how far it went."""
-        self.path, self.end = path, len(path) - 1.0
-        self.facing = self._facing(path)
-        self.frames = np.array([self.start.frame], dtype=np.int32)
-        self.placements = self.start.placement[None]
-        self.joints = [_Joint(self.start, 0.0, 1)]
-        commit = round(self.config.commit_s * self.fps)
-        while True:
-            at = self.joints[-1]
-            target = min(at.progress + self.config.horizon_m / _SPACING, self.end)
-            if not (
-                self._advance(at, target, commit, self.config.budget, self.config.search, _CROWDED)
-                or self._advance_from_farther_back(target)
-            ):
-                return False, at.progress
-            if target == self.end and self.arrived:
-                return True, self.end
-
-    def _facing(self, path: FloatArray) -> FloatArray:
-        """How facing counts along a path: not at all near places that are narrow for a body."""
-        facing = np.full(len(path), self.config.search.facing)
-        if self.world is not None:
-            narrow = (
-                self.world.distances(path)
-                < self.graph.half_width_m + 2.0 * self.config.search.margin_m
-            )
-            around = round(_NARROW_M / _SPACING)
-            near = np.convolve(narrow, np.ones(2 * around + 1))[around : around + len(path)]
-            facing[near > 0] = 0.0
-        return facing
-
-    def _come_near(self) -> None:
-        """Go as far as there is a way, where none leads on."""
-        at = self.joints[-1]
-        target = min(at.progress + self.config.horizon_m / _SPACING, self.end)
-        budget = _MORE * self.config.budget
-        self._play(at, self._search(at, target, budget, self.config.search, _CROWDED), None)
-
-    def _advance_from_farther_back(self, target: float) -> bool:
-        """Look for a way to where none was found, longer and from earlier joints."""
-        latest = self.joints[-1].played
-        costs = self.config.search
-        for back_s, more, greed, crowded in _AGAIN:
-            earlier = [j for j in self.joints if j.played <= latest - back_s * self.fps]
-            joint = earlier[-1] if earlier else self.joints[0]
-            greedy = replace(costs, pace=costs.pace / greed, jump=costs.jump / greed**2)
-            if self._advance(joint, target, None, more * self.config.budget, greedy, crowded):
-                self.backtracks += 1
-                return True
-        return False
-
-    def _advance(
-        self,
-        at: _Joint,
-        target: float,
-        commit: int | None,
-        budget: int,
-        search: SearchConfig,
-        crowded: int,
-    ) -> bool:
-        """Go on from a joint to a target; what was walked after the joint is taken back.
-
-        Args:
-            at: The joint.
-            target: How much of the path is to be done [points].
-            commit: After how many frames the first ways of it suffice; None where all are to be
-                played.
-            budget: Most ways to look at.
-            search: What a good way is.
-            crowded: Most states in one neighbourhood.
-
-        Returns:
-            Whether there is such a way. If there is none, nothing is changed.
-        """
-        found = self._search(at, target, budget, search, crowded)
-        if found.arrived:
-            self._play(at, found, commit if target < self.end else None)
-            self.arrived = target == self.end
-        return found.arrived
-
-    def _search(
-        self, at: _Joint, target: float, budget: int, search: SearchConfig, crowded: int
-    ) -> Found:
-        last = target == self.end
-        found = self.graph.search(
-            at.state, self.path, self.facing, _SPACING, at.progress, target, search, budget,
-            crowded, self.grid, self.config.arrival_m if last else None,
-            last and self.config.stop,
-        )  # fmt: skip
-        self.looked += found.looked
-        self.collided += found.collided
-        return found
-
-    def _play(self, at: _Joint, found: Found, commit: int | None) -> None:
-        """Play the first ways of what was found at a joint; what was walked after it is gone."""
-        ways = len(found.joints)
-        if commit is not None:
-            ways = 1 + int(np.searchsorted(found.joints[:-1] + 1, commit))
-        del self.joints[self.joints.index(at) + 1 :]
-        for joint, progress, left in zip(
-            found.joints[:ways], found.progress, found.displacements, strict=False
-        ):
-            state = State(int(found.frames[joint]), found.placements[joint], left)
-            self.joints.append(_Joint(state, float(progress), at.played + int(joint) + 1))
-        stop = self.joints[-1].played - at.played
-        self.frames = np.concatenate([self.frames[: at.played], found.frames[:stop]])
-        self.placements = np.concatenate([self.placements[: at.played], found.placements[:stop]])
-
-
-def distances_to(path: FloatArray, points: FloatArray) -> FloatArray:
-    """Distance of points (n, 2) to the nearest place on a path (p, 2), p at least 2 [m]."""
-    along = np.diff(path, axis=0)
-    square = np.maximum(np.sum(along**2, axis=1), 1e-18)
-    nearest = np.full(len(points), np.inf)
-    for corner, way, length in zip(path, along, square, strict=False):
-        away = points - corner
-        share = np.clip(away @ way / length, 0.0, 1.0)
-        np.minimum(nearest, np.hypot(*(away - share[:, None] * way).T), out=nearest)
-    return nearest
-
-
-def _long_enough(path: FloatArray) -> FloatArray:
-    """Points `_SPACING` apart, two of them at least."""
-    points = resampled(path, _SPACING)
-    return points if len(points) > 1 else np.repeat(points, 2, axis=0)
+    expected = (
+        (graph, SearchGraph, "the graph", "a SearchGraph, made by SearchGraph(graph)"),
+        (start, State, "the start", "a State, as made by State.at(graph, frame, x, y, yaw)"),
+        (world, World | None, "the world", "a World of boxes, or None"),
+        (config, SketchConfig | None, "the configuration", "a SketchConfig, or None"),
+    )
+    for given, kind, what, right in expected:
+        if not isinstance(given, kind):
+            raise UsageError(f"{what} must be {right}, got {type(given).__name__}")

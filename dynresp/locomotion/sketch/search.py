@@ -20,12 +20,14 @@ from dynresp.errors import UsageError
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.walk import check_in_component
+from dynresp.locomotion.playing.state import State
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.footprints import body_arrays, footprints
+from dynresp.locomotion.worlds.paths import window_m
+from dynresp.locomotion.worlds.settings import check_numbers
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
-
-IntArray = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class SearchConfig:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
+        check_numbers(self)
         if not 0 <= self.facing < 1:
             raise UsageError(
                 f"facing must be at least 0 and below 1, got {self.facing}: from 1 on it would pay "
@@ -67,34 +70,6 @@ class SearchConfig:
                 raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
         if not self.farthest_m > 0:
             raise UsageError(f"farthest_m must be above 0, got {self.farthest_m}")
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Where an avatar is.
-
-    Attributes:
-        frame: The frame it is at.
-        placement: (4,) where that frame's clip is put; see `dynresp.locomotion.graph.placement`.
-        displacement: (91,) what is left of blends: the displacement at the last jump (45), its
-            rate of change then (45) and the time since [s]; see `displacement_kernel`. None where
-            the frame was played as recorded.
-    """
-
-    frame: int
-    placement: FloatArray
-    displacement: FloatArray | None = None
-
-    @classmethod
-    def at(cls, graph: MotionGraph, frame: int, x: float, y: float, yaw: float) -> State:
-        """The state in which a frame's root is at x, y [m] and faces yaw [rad]."""
-        root = graph.database.planar[frame]
-        where = np.array([x, y, root[2], yaw])
-        return cls(frame, placement.compose(where, placement.inverse(root)))
-
-    def root(self, graph: MotionGraph) -> FloatArray:
-        """(4,) x, y, z and yaw of the root."""
-        return placement.compose(self.placement, graph.database.planar[self.frame])
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +182,7 @@ class SearchGraph:
         settings[kernel.TARGET] = target
         settings[kernel.REACHED] = target - (arrival_m or 0.0) / spacing - 1e-9
         settings[kernel.RADIUS] = np.inf if arrival_m is None else arrival_m
+        settings[kernel.WINDOW] = np.ceil(window_m(self.graph.database.fps) / spacing)
         settings[kernel.BLEND] = self.graph.config.blend_s
         settings[kernel.BLEND_RATE] = self.graph.config.blend_rate_s
         begin = np.array([*start.placement[[0, 1, 3]], progress, 0.0])

@@ -12,14 +12,6 @@ _WRAP = 1 << 14
 
 
 @njit
-def twice(array):  # type: ignore[no-untyped-def]
-    """An array of twice as many rows that begins with those of another."""
-    more = np.empty((2 * len(array), *array.shape[1:]), array.dtype)
-    more[: len(array)] = array
-    return more
-
-
-@njit
 def sift_up(costs, ways, at):  # type: ignore[no-untyped-def]
     """Bring the last entry of a heap to its place; of equal costs the lower way comes first."""
     cost, way = costs[at], ways[at]

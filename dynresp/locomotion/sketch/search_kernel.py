@@ -18,8 +18,9 @@ import numpy as np
 from numba import njit, types
 
 from dynresp.compiling import compiled
+from dynresp.growing import doubled
 from dynresp.locomotion.playing.blending_kernel import play_kernel
-from dynresp.locomotion.sketch.search_heap import number, sift_down, sift_up, slot_of, twice
+from dynresp.locomotion.sketch.search_heap import number, sift_down, sift_up, slot_of
 from dynresp.locomotion.worlds.collision_kernel import (
     FOOTPRINTS,
     GRID,
@@ -28,12 +29,13 @@ from dynresp.locomotion.worlds.collision_kernel import (
     collides,
 )
 from dynresp.locomotion.worlds.footprint_kernel import BODY, footprint
+from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
 from dynresp.motion.kinematics_kernel import kinematics_kernel
 
 (
     PACE, STRAY, JUMP, AHEAD, FARTHEST, MARGIN, SPACING, FRAME_TIME, BLEND, BLEND_RATE,
-    TARGET, REACHED, RADIUS, SETTINGS,
-) = range(14)  # fmt: skip
+    TARGET, REACHED, RADIUS, WINDOW, SETTINGS,
+) = range(15)  # fmt: skip
 """Entries of `settings` of `search_kernel`, and how many there are."""
 
 X, Y, YAW, PROGRESS, COST = range(5)
@@ -42,8 +44,6 @@ X, Y, YAW, PROGRESS, COST = range(5)
 PLACE, OFFSET, RATE, AGE, PLAYED = 0, 4, 49, 94, 95
 """Where in a row of `playing` the arrays of `play_kernel` begin, and how long it is."""
 
-# How far before and beyond the nearest point of the path the next one is looked for [points].
-_BACK, _ON = 2, 8
 # Places that count as the same: as one state, and as one neighbourhood [m, rad].
 _NEAR, _NEAR_TURN = 0.1, math.pi / 12
 _AROUND, _AROUND_TURN = 0.25, math.pi / 6
@@ -54,40 +54,6 @@ _FRAMES = types.Array(types.int32, 1, "C", readonly=True)
 _OFFSETS = types.Array(types.int64, 1, "C", readonly=True)
 _FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 _COSTS = types.Array(types.float32, 1, "C", readonly=True)
-
-
-@njit
-def _nearest_on(path, x, y, progress, spacing):  # type: ignore[no-untyped-def]
-    """The point of the path nearest to x, y, not far from `progress`: (points, distance)."""
-    last = len(path) - 1
-    first = min(max(int(progress) - _BACK, 0), last - 1)
-    stop = min(int(progress) + _ON, last)
-    least, nearest = math.inf, progress
-    for k in range(first, max(stop, first + 1)):
-        along_x, along_y = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
-        away_x, away_y = x - path[k, 0], y - path[k, 1]
-        share = (along_x * away_x + along_y * away_y) / (spacing * spacing)
-        share = min(max(share, 0.0), 1.0)
-        off_x, off_y = away_x - share * along_x, away_y - share * along_y
-        square = off_x * off_x + off_y * off_y
-        if square < least:
-            least, nearest = square, k + share
-    return nearest, math.sqrt(least)
-
-
-@njit
-def _objective(path, facing, x, y, cosine, sine, progress, away, settings):  # type: ignore[no-untyped-def]
-    """Eq. 8 with the way left in place of the straight distance [m]."""
-    last = len(path) - 1
-    goal = min(progress + settings[AHEAD] / settings[SPACING], float(last))
-    k = min(int(goal), last - 1)
-    to_x = path[k, 0] + (goal - k) * (path[k + 1, 0] - path[k, 0]) - x
-    to_y = path[k, 1] + (goal - k) * (path[k + 1, 1] - path[k, 1]) - y
-    straight = math.sqrt(to_x * to_x + to_y * to_y)
-    left = max(settings[TARGET] - progress, 0.0) * settings[SPACING] + away
-    if straight < 1e-9:
-        return left
-    return left * (1.0 - facing[k] * (to_x * cosine + to_y * sine) / straight)
 
 
 @njit
@@ -106,7 +72,7 @@ def _play(  # type: ignore[no-untyped-def]
     for frame in range(entry, stop + 1):
         x = state[X] + cosine * planar[frame, 0] - sine * planar[frame, 1]
         y = state[Y] + sine * planar[frame, 0] + cosine * planar[frame, 1]
-        state[PROGRESS], away = _nearest_on(path, x, y, state[PROGRESS], settings[SPACING])
+        state[PROGRESS], away = nearest_on(path, x, y, state[PROGRESS], settings[WINDOW])
         if away > settings[FARTHEST]:
             return -1, math.inf
         state[COST] += step * (1.0 + settings[STRAY] * away * away)
@@ -117,9 +83,11 @@ def _play(  # type: ignore[no-untyped-def]
         )
         if arrived or frame == stop:
             yaw = state[YAW] + planar[frame, 2]
-            value = _objective(
-                path, facing, x, y, math.cos(yaw), math.sin(yaw), state[PROGRESS], away, settings
-            )
+            at = min(int(state[PROGRESS] + settings[AHEAD] / settings[SPACING]), last - 1)
+            value = eq_8(
+                path, x, y, math.cos(yaw), math.sin(yaw), state[PROGRESS], settings[TARGET], away,
+                settings[AHEAD], facing[at], settings[SPACING],
+            )  # fmt: skip
             return (frame if arrived else -1), value
     return -1, math.inf
 
@@ -231,7 +199,8 @@ def search_kernel(  # type: ignore[no-untyped-def]
         playing: (PLAYED,) how it was played; see `PLACE`.
         settings: (SETTINGS,) lengths in metres, angles in radians, see `SearchConfig`; TARGET and
             REACHED are in points of the path: where eq. 8 looks to, and from where on a frame
-            counts as an arrival if it is within RADIUS of the path's last point.
+            counts as an arrival if it is within RADIUS of the path's last point. WINDOW is that of
+            `nearest_on`.
         path: (p, 2) points SPACING apart, at least two [m].
         facing: (p,) c of eq. 8 along the path.
         budget: Most ways to look at.
@@ -287,7 +256,7 @@ def search_kernel(  # type: ignore[no-untyped-def]
             if value == math.inf:
                 continue
             if size == len(costs):
-                costs, ways = twice(costs), twice(ways)
+                costs, ways = doubled(costs), doubled(ways)
             costs[size] = state[COST] + settings[JUMP] * distances[way] + value
             ways[size] = (np.int64(node) << 32) | way
             sift_up(costs, ways, size)
@@ -326,8 +295,8 @@ def search_kernel(  # type: ignore[no-untyped-def]
                     collided += 1
                     continue
             if known == len(frames):
-                states, played = twice(states), twice(played)
-                frames, parents, taken = twice(frames), twice(parents), twice(taken)
+                states, played = doubled(states), doubled(played)
+                frames, parents, taken = doubled(frames), doubled(parents), doubled(taken)
             seen[slot] = key
             around[slot_near] = near
             crowd[slot_near] += 1

@@ -22,11 +22,10 @@ from dynresp.locomotion.worlds.contacts import (
 )
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
 from dynresp.motion import legs
+from dynresp.motion.arrays import LongArray
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
-
-IntArray = npt.NDArray[np.int64]
 
 RECORDED_SCALE = 1.0382
 """Size of the recorded blocks on the character: its legs are so much longer than the subject's,
@@ -68,8 +67,8 @@ class BlockFit:
     yaw: float
     corner: FloatArray
     side: float
-    levels: IntArray
-    stances: IntArray
+    levels: LongArray
+    stances: LongArray
     base: FloatArray
     scatter: float
     misfit: FloatArray
@@ -175,7 +174,7 @@ def _level_soles(character: Character, motion: Motion) -> FloatArray:
     return soles[np.abs(tilt) < _TILT]
 
 
-def _cells(points: FloatArray, yaw: float, corner: FloatArray, side: float) -> IntArray:
+def _cells(points: FloatArray, yaw: float, corner: FloatArray, side: float) -> LongArray:
     """(k, 2) the blocks under points (k, 2 or more) in a grid."""
     return np.floor((_turned(points, yaw) - corner) / side).astype(np.int64)
 
@@ -231,8 +230,8 @@ def _off_middle(soles: FloatArray, yaw: float, corner: FloatArray, side: float) 
 
 
 def _block_means(
-    cells: IntArray, heights: FloatArray, shape: tuple[int, ...]
-) -> tuple[IntArray, FloatArray]:
+    cells: LongArray, heights: FloatArray, shape: tuple[int, ...]
+) -> tuple[LongArray, FloatArray]:
     """How many stances are on each block of a grid, and their mean height [m]; 0 where none."""
     counts, sums = np.zeros(shape, dtype=np.int64), np.zeros(shape)
     np.add.at(counts, tuple(cells.T), 1)

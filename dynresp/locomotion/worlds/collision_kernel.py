@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, types
 
 from dynresp.compiling import compiled
@@ -18,6 +19,7 @@ from dynresp.compiling import compiled
 REALS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 CLEARANCE = types.Array(types.float32, 2, "C", readonly=True)
+WINDOWS = types.Array(types.int64, 2, "C", readonly=True)
 LISTS = types.Array(types.int32, 1, "C", readonly=True)
 FOOTPRINTS = types.Array(types.float32, 2, "C", readonly=True)
 GRID = (REALS, CLEARANCE, LISTS, LISTS, ROWS)
@@ -53,7 +55,8 @@ def collides(  # type: ignore[no-untyped-def]
         footprint: (4,) least x, largest x, least y, largest y in the root's facing frame [m].
         margin: [m].
         frame: (3,) x and y of the grid's corner, side of its cells [m].
-        clearance: (columns, rows) distance from the middle of each cell to the nearest box [m].
+        clearance: (columns, rows) distance from the middle of each cell to the nearest box, where
+            that is within reach [m].
         starts: (columns * rows + 1,) where the boxes near each cell begin in `members`.
         members: (k,) boxes.
         boxes: (n, 6) rows of `World.boxes`.
@@ -77,6 +80,96 @@ def collides(  # type: ignore[no-untyped-def]
         if not _apart(middle_x, middle_y, cosine, sine, half_x, half_y, boxes[members[member]]):
             return True
     return False
+
+
+@njit(inline="always")
+def _away(x, y, box):  # type: ignore[no-untyped-def]
+    """Distance of a point to a box [m], negative inside."""
+    x, y = x - box[0], y - box[1]
+    beyond_x = abs(box[4] * x + box[5] * y) - box[2]
+    beyond_y = abs(box[4] * y - box[5] * x) - box[3]
+    out_x, out_y = max(beyond_x, 0.0), max(beyond_y, 0.0)
+    return math.sqrt(out_x * out_x + out_y * out_y) + min(max(beyond_x, beyond_y), 0.0)
+
+
+@compiled(
+    types.void(ROWS, WINDOWS, REALS, types.float64, types.float32[:, ::1], types.int64[::1])
+)  # fmt: skip
+def count_kernel(boxes, windows, frame, near, clearance, counts):  # type: ignore[no-untyped-def]
+    """Count the boxes near to each cell of a grid, and find how near they come.
+
+    Args:
+        boxes: (n, 6) rows of `World.boxes`.
+        windows: (n, 4) first and last column, first and last row of cells that may be near.
+        frame: (3,) x and y of the grid's corner, side of its cells [m].
+        near: Distance from the middle of a cell up to which a box is near to it [m].
+        clearance: In and out, (columns, rows) the least distance [m].
+        counts: Out, (columns * rows,), zeros before.
+    """
+    for box in range(len(boxes)):
+        for column in range(windows[box, 0], windows[box, 1] + 1):
+            x = frame[0] + frame[2] * (column + 0.5)
+            for row in range(windows[box, 2], windows[box, 3] + 1):
+                away = _away(x, frame[1] + frame[2] * (row + 0.5), boxes[box])
+                if away <= near:
+                    counts[column * clearance.shape[1] + row] += 1
+                    clearance[column, row] = min(clearance[column, row], np.float32(away))
+
+
+@compiled(
+    types.void(ROWS, WINDOWS, REALS, types.float64, types.int64, types.int64[::1], types.int32[::1])
+)  # fmt: skip
+def list_kernel(boxes, windows, frame, near, rows, free, members):  # type: ignore[no-untyped-def]
+    """List the boxes near to each cell of a grid, ascending.
+
+    Args:
+        boxes: See `count_kernel`.
+        windows: The same.
+        frame: The same.
+        near: The same.
+        rows: Of cells.
+        free: (columns * rows,) where the list of each cell begins; where it ends, out.
+        members: Out, (k,) the lists.
+    """
+    for box in range(len(boxes)):
+        for column in range(windows[box, 0], windows[box, 1] + 1):
+            x = frame[0] + frame[2] * (column + 0.5)
+            for row in range(windows[box, 2], windows[box, 3] + 1):
+                if _away(x, frame[1] + frame[2] * (row + 0.5), boxes[box]) <= near:
+                    cell = column * rows + row
+                    members[free[cell]] = box
+                    free[cell] += 1
+
+
+@compiled(types.void(ROWS, types.float64, *GRID, types.float64[::1]))
+def distances_kernel(  # type: ignore[no-untyped-def]
+    points, farthest, frame, clearance, starts, members, boxes, out
+):
+    """How far points are from the nearest box.
+
+    Args:
+        points: (n, 2) [m].
+        farthest: Distances beyond this are not told apart [m].
+        frame: Of the grid.
+        clearance: Of its cells.
+        starts: Of its lists.
+        members: Its lists.
+        boxes: Rows of `World.boxes`.
+        out: Out, (n,) [m], negative inside.
+    """
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        column = math.floor((x - frame[0]) / frame[2])
+        row = math.floor((y - frame[1]) / frame[2])
+        nearest = farthest
+        if column < 0 or row < 0 or column >= clearance.shape[0] or row >= clearance.shape[1]:
+            for box in range(len(boxes)):
+                nearest = min(nearest, _away(x, y, boxes[box]))
+        else:
+            cell = column * clearance.shape[1] + row
+            for member in range(starts[cell], starts[cell + 1]):
+                nearest = min(nearest, _away(x, y, boxes[members[member]]))
+        out[i] = nearest
 
 
 @compiled(types.void(ROWS, FOOTPRINTS, types.float64, *GRID, types.boolean[::1]))

@@ -8,14 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.worlds.obstacles import World, box_distance
+from dynresp.locomotion.worlds.obstacles import World
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.rotations import FloatArray
 
-BoolArray = npt.NDArray[np.bool_]
-
-# Most boxes in the lists of all cells: about 1 GB while they are sorted, and far below the 2^31
-# that `CollisionGrid.starts` can count.
-_MOST_MEMBERS = 20_000_000
+# Most boxes in the lists of all cells: 400 MB, and below the 2^31 that `CollisionGrid.starts` can
+# count.
+_MOST_MEMBERS = 100_000_000
+# Half the diagonal of a cell of side 1, and a little more.
+_DIAGONAL = 0.7072
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +25,12 @@ class CollisionGrid:
 
     Attributes:
         frame: (3,) x and y of the grid's corner, side of its cells [m].
-        clearance: (columns, rows) distance from the middle of each cell to the nearest box [m].
+        clearance: (columns, rows) distance from the middle of each cell to the nearest box [m]; of
+            those that are farther than anything reaches, any larger number.
         starts: (columns * rows + 1,) where the boxes near each cell begin in `members`.
         members: (k,) boxes.
         boxes: (n, 6) rows of `World.boxes`.
+        reach_m: Up to where boxes are near to a point [m].
     """
 
     frame: FloatArray
@@ -35,6 +38,7 @@ class CollisionGrid:
     starts: npt.NDArray[np.int32]
     members: npt.NDArray[np.int32]
     boxes: FloatArray
+    reach_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -48,7 +52,7 @@ class CollisionGrid:
 
     @classmethod
     def of(cls, world: World, reach_m: float, cell_m: float = 0.2) -> CollisionGrid:
-        """Lay out a world.
+        """Lay out a world. The time is that of looking at the cells about each box.
 
         Args:
             world: The boxes.
@@ -59,37 +63,44 @@ class CollisionGrid:
         Raises:
             UsageError: There are too many cells, or too many boxes near to them.
         """
-        low = np.array(world.bounds[:2])
+        # Numba takes a third of a second to import, the kernels longer when first compiled.
+        from dynresp.locomotion.worlds.collision_kernel import count_kernel, list_kernel
+
         columns, rows = world.grid_shape(cell_m)
-        x = low[0] + cell_m * (np.arange(columns) + 0.5)
-        y = low[1] + cell_m * (np.arange(rows) + 0.5)
-        middles = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-        clearance = np.full((columns, rows), np.inf)
-        cells, members, count = [], [], 0
-        for index, box in enumerate(world.boxes):
-            distance = box_distance(middles, box)
-            np.minimum(clearance, distance, out=clearance)
-            near = np.flatnonzero(distance.ravel() <= reach_m + 0.7072 * cell_m)
-            count += len(near)
-            if count > _MOST_MEMBERS:
-                raise UsageError(
-                    f"the lists of boxes within reach ({reach_m:g} m) of each cell ({cell_m:g} m) "
-                    f"would hold more than {_MOST_MEMBERS}; leave out boxes that others cover, or "
-                    "choose larger cells"
-                )
-            cells.append(near)
-            members.append(np.full(len(near), index, dtype=np.int32))
-        all_cells = np.concatenate(cells)
-        order = np.argsort(all_cells, kind="stable")
-        starts = np.zeros(columns * rows + 1, dtype=np.int32)
-        np.cumsum(np.bincount(all_cells, minlength=columns * rows), out=starts[1:])
-        return cls(
-            np.array([*low, cell_m]),
-            clearance.astype(np.float32),
-            starts,
-            np.concatenate(members)[order],
-            world.boxes,
-        )
+        frame = np.array([*world.bounds[:2], cell_m])
+        near = reach_m + _DIAGONAL * cell_m
+        windows = _windows(world.boxes, frame, near, (columns, rows))
+        clearance = np.full((columns, rows), np.inf, dtype=np.float32)
+        counts = np.zeros(columns * rows, dtype=np.int64)
+        count_kernel(world.boxes, windows, frame, near, clearance, counts)
+        total = int(counts.sum())
+        if total > _MOST_MEMBERS:
+            raise UsageError(
+                f"the lists of boxes within reach ({reach_m:g} m) of each cell ({cell_m:g} m) "
+                f"would hold {total}, at most {_MOST_MEMBERS} are allowed; leave out boxes that "
+                "others cover, or choose larger cells"
+            )
+        starts = np.zeros(columns * rows + 1, dtype=np.int64)
+        np.cumsum(counts, out=starts[1:])
+        members = np.empty(total, dtype=np.int32)
+        list_kernel(world.boxes, windows, frame, near, rows, starts[:-1].copy(), members)
+        return cls(frame, clearance, starts.astype(np.int32), members, world.boxes, reach_m)
+
+    def distances(self, points: npt.ArrayLike) -> FloatArray:
+        """Distance of points on the ground to the nearest box or rim, as `World.distances`.
+
+        Args:
+            points: (n, 2) [m].
+
+        Returns:
+            (n,) [m], negative inside; at most `reach_m`.
+        """
+        from dynresp.locomotion.worlds.collision_kernel import distances_kernel
+
+        at = np.ascontiguousarray(points, dtype=np.float64)
+        out = np.empty(len(at))
+        distances_kernel(at, self.reach_m, *self.arrays, out)
+        return out
 
     def collisions(
         self, roots: npt.ArrayLike, footprints: npt.ArrayLike, margin_m: float = 0.0
@@ -112,3 +123,20 @@ class CollisionGrid:
         out = np.zeros(len(at), dtype=bool)
         collisions_kernel(at, reach, margin_m, *self.arrays, out)
         return out
+
+
+def _windows(
+    boxes: FloatArray, frame: FloatArray, near: float, shape: tuple[int, int]
+) -> npt.NDArray[np.int64]:
+    """(n, 4) first and last column, first and last row of the cells that may be near to a box."""
+    c, s = np.abs(boxes[:, 4]), np.abs(boxes[:, 5])
+    halves = np.stack(
+        [c * boxes[:, 2] + s * boxes[:, 3], s * boxes[:, 2] + c * boxes[:, 3]], axis=1
+    )
+    low = np.floor((boxes[:, :2] - halves - near - frame[:2]) / frame[2])
+    high = np.floor((boxes[:, :2] + halves + near - frame[:2]) / frame[2])
+    last = np.array(shape) - 1.0
+    # Before they become whole numbers: boxes may be larger than those can tell.
+    low, high = np.clip(low, 0.0, last + 1.0), np.clip(high, -1.0, last)
+    windows = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
+    return np.ascontiguousarray(windows.astype(np.int64))

@@ -8,6 +8,7 @@ import numpy as np
 
 from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
+from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.motion.rotations import FloatArray
 
 
@@ -41,6 +42,7 @@ class MazeConfig:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
+        check_numbers(self)
         if min(self.columns, self.rows) < 1 or self.columns * self.rows < 2:
             raise UsageError(f"a maze needs two cells, got {self.columns} x {self.rows}")
         if not (self.wall_m > 0 and 0 < self.gap_m < self.cell_m - self.wall_m):

@@ -18,15 +18,15 @@ from dynresp.motion.rotations import FloatArray
 _RIM = 500.0
 # Bodies farther than this from a root in rest [m] belong to no character of human size.
 _REACH = 1.5
-# Grids over a world, and what is worked out in each cell for each box, must fit into memory and
-# time: a plan in cells of 0.1 m over the largest world takes about 1.5 GB and half a minute.
+# Grids over a world must fit into memory and time: a plan in cells of 0.1 m over the largest world
+# takes about 1.5 GB and half a minute.
 _MOST_SIDE_M = 400.0
 _MOST_AREA_M2 = 40_000.0
-_MOST_BOX_AREA_M2 = 4e6
 _MOST_CELLS = 5_000_000
-_MOST_BOX_CELLS = 500_000_000
-# The walls of the rim.
-_WALLS = 4
+MOST_BOXES = 10_000
+"""Boxes of a world at most."""
+# What lies within this of each box [m], added up, is at most this much ground [m^2].
+_NEAR_M, _MOST_NEAR_M2 = 2.0, 1e6
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,15 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not all(math.isfinite(v) for v in (*self.center, self.yaw)):
+        if not (_are_finite(self.center, 2) and _are_finite((self.yaw,), 1)):
             raise UsageError(
-                f"an obstacle must be at a finite place, got {self.center}, {self.yaw}"
+                f"an obstacle must be at a finite place, got {self.center!r}, {self.yaw!r}"
             )
-        if not all(math.isfinite(v) and v > 0 for v in (*self.half_sizes, self.height)):
+        sizes_are_right = _are_finite(self.half_sizes, 2) and _are_finite((self.height,), 1)
+        if not (sizes_are_right and min(*self.half_sizes, self.height) > 0):
             raise UsageError(
-                f"the sizes of an obstacle must be above 0, got half sizes {self.half_sizes} "
-                f"and height {self.height}"
+                f"the sizes of an obstacle must be above 0, got half sizes {self.half_sizes!r} "
+                f"and height {self.height!r}"
             )
 
 
@@ -71,8 +72,8 @@ class World:
 
     Raises:
         UsageError: The bounds enclose nothing, or more than 400 m along a side or 40,000 m^2; or
-            there are more boxes than can be planned around: the area times the boxes and the
-            rim's four walls must not exceed 4,000,000 m^2.
+            there are more than 10,000 boxes, or boxes so large and many that the ground within 2 m
+            of each, added up, is more than 1,000,000 m^2.
     """
 
     bounds: tuple[float, float, float, float]
@@ -80,8 +81,12 @@ class World:
 
     def __post_init__(self) -> None:
         """Check the bounds."""
+        if not _are_finite(self.bounds, 4):
+            raise UsageError(
+                f"bounds must be (least x, least y, largest x, largest y), got {self.bounds!r}"
+            )
         low_x, low_y, high_x, high_y = self.bounds
-        if not (all(math.isfinite(v) for v in self.bounds) and low_x < high_x and low_y < high_y):
+        if not (low_x < high_x and low_y < high_y):
             raise UsageError(
                 f"bounds must be (least x, least y, largest x, largest y), got {self.bounds}"
             )
@@ -97,12 +102,40 @@ class World:
                 f"bounds must enclose at most {_MOST_AREA_M2:.0f} m2, got {area:.0f} m2; "
                 "cut the world to where the avatar walks"
             )
-        if area * (len(self.obstacles) + _WALLS) > _MOST_BOX_AREA_M2:
+        if not isinstance(self.obstacles, tuple):
+            kind = type(self.obstacles).__name__
+            raise UsageError(f"obstacles must be a tuple of Obstacle, got {kind}")
+        if len(self.obstacles) > MOST_BOXES:
             raise UsageError(
-                f"a world of {area:.0f} m2 may have at most "
-                f"{int(_MOST_BOX_AREA_M2 / area) - _WALLS} boxes, got {len(self.obstacles)}; "
-                "leave out boxes that the avatar does not come near, or cut the world"
+                f"a world may have at most {MOST_BOXES} boxes, got {len(self.obstacles)}; "
+                "leave out boxes that the avatar does not come near"
             )
+        for box in self.obstacles:
+            if not isinstance(box, Obstacle):
+                raise UsageError(f"obstacles must be Obstacle, got {type(box).__name__}")
+        ground = self._near_ground()
+        if ground > _MOST_NEAR_M2:
+            raise UsageError(
+                f"the {len(self.obstacles)} boxes are too large and too many: the ground within "
+                f"{_NEAR_M:g} m of each adds up to {ground:.0f} m2, at most {_MOST_NEAR_M2:.0f} "
+                "are allowed; leave out boxes that others cover or that the avatar does not come "
+                "near"
+            )
+
+    def _near_ground(self) -> float:
+        """How much ground within the bounds lies near boxes, added up [m^2]."""
+        if not self.obstacles:
+            return 0.0
+        boxes = self.boxes[: len(self.obstacles)]
+        c, s = np.abs(boxes[:, 4]), np.abs(boxes[:, 5])
+        area = np.ones(len(boxes))
+        for axis, half in enumerate(
+            (c * boxes[:, 2] + s * boxes[:, 3], s * boxes[:, 2] + c * boxes[:, 3])
+        ):
+            low = np.maximum(boxes[:, axis] - half - _NEAR_M, self.bounds[axis])
+            high = np.minimum(boxes[:, axis] + half + _NEAR_M, self.bounds[2 + axis])
+            area *= np.maximum(high - low, 0.0)
+        return float(area.sum())
 
     @functools.cached_property
     def boxes(self) -> FloatArray:
@@ -124,15 +157,14 @@ class World:
         boxes.flags.writeable = False
         return boxes
 
-    def grid_shape(self, side_m: float, more: int = 0) -> tuple[int, int]:
+    def grid_shape(self, side_m: float) -> tuple[int, int]:
         """How many square cells a grid over the bounds has along x and y.
 
         Args:
             side_m: Side of the cells [m].
-            more: How many things there are to keep clear of beside the boxes.
 
         Raises:
-            UsageError: There are too many cells, or too many for so many boxes.
+            UsageError: There are too many.
         """
         if not 0 < side_m < math.inf:
             raise UsageError(f"the side of cells must be above 0 and finite, got {side_m:g}")
@@ -140,12 +172,10 @@ class World:
         size = (high_x - low_x, high_y - low_y)
         # Floats, which may be infinite here, as whole numbers may not.
         cells = [max(1.0, float(np.ceil(length / side_m))) for length in size]
-        boxes = len(self.obstacles) + _WALLS + more
-        if not (math.prod(cells) <= _MOST_CELLS and math.prod(cells) * boxes <= _MOST_BOX_CELLS):
+        if not math.prod(cells) <= _MOST_CELLS:
             raise UsageError(
-                f"a world of {size[0]:g} x {size[1]:g} m in cells of {side_m:g} m with {boxes} "
-                f"boxes is too much to lay out: at most {_MOST_CELLS} cells, and {_MOST_BOX_CELLS} "
-                "times a box; choose larger cells or a smaller world, or leave out boxes"
+                f"a world of {size[0]:g} x {size[1]:g} m in cells of {side_m:g} m is too much to "
+                f"lay out: at most {_MOST_CELLS} cells; choose larger cells or a smaller world"
             )
         return int(cells[0]), int(cells[1])
 
@@ -163,6 +193,15 @@ class World:
         for box in self.boxes:
             np.minimum(nearest, box_distance(points, box), out=nearest)
         return nearest
+
+
+def _are_finite(values: object, count: int) -> bool:
+    """Whether these are so many finite numbers."""
+    try:
+        numbers = [float(value) for value in values]  # type: ignore[attr-defined]
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return len(numbers) == count and all(math.isfinite(number) for number in numbers)
 
 
 def box_distance(points: FloatArray, box: FloatArray) -> FloatArray:

@@ -8,10 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import DynrespError, UsageError
+from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
+from dynresp.locomotion.worlds.paths import as_place, resampled
+from dynresp.locomotion.worlds.settings import check_numbers
+from dynresp.motion.arrays import IndexArray
 from dynresp.motion.rotations import FloatArray
-
-IntArray = npt.NDArray[np.intp]
 
 # Steps to half of the eight neighbours of a cell; the other half are the same ways back.
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
@@ -21,6 +23,8 @@ _SMOOTHINGS_PLANNED, _SMOOTHINGS_FITTED = 60, 15
 # Most states that are looked at around a sketch, each of about 1 kB: those 1 m around 2.5 km, or
 # 4 m around 160 m.
 _MOST_STATES = 4_000_000
+# Discs to keep out of are looked at in every cell.
+_MOST_DISC_CELLS = 500_000_000
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ class PlanningConfig:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
+        check_numbers(self)
         if not (0 < self.resolution_m <= self.reach_m and 0 < self.narrow_m < self.comfort_m):
             raise UsageError(
                 "a plan needs 0 < resolution_m <= reach_m and 0 < narrow_m < comfort_m, got "
@@ -63,9 +68,16 @@ class _Grid:
     """The middles of square cells over a world, and what a metre costs there."""
 
     def __init__(self, world: World, config: PlanningConfig, blocked: FloatArray) -> None:
-        self.config, self.world = config, world
+        self.config = config
         self.low = np.array(world.bounds[:2])
-        self.shape = world.grid_shape(config.resolution_m, len(blocked))
+        self.shape = world.grid_shape(config.resolution_m)
+        if self.cells * len(blocked) > _MOST_DISC_CELLS:
+            raise UsageError(
+                f"{len(blocked)} discs in {self.cells} cells are too much to keep out of: at most "
+                f"{_MOST_DISC_CELLS} cells times a disc; put obstacles into the world instead"
+            )
+        # Farther away all places are alike.
+        self.boxes = CollisionGrid.of(world, config.comfort_m, config.resolution_m)
         self.blocked = blocked
         index = np.stack(np.unravel_index(np.arange(self.cells), self.shape), axis=1)
         self.middles = self.low + config.resolution_m * (index + 0.5)
@@ -81,10 +93,13 @@ class _Grid:
         return int(np.prod(self.shape))
 
     def clearance_at(self, points: FloatArray) -> FloatArray:
-        """Distance of points (..., 2) to boxes and to blocked discs (rows x, y, radius)."""
-        out = self.world.distances(points)
+        """Distance of points (n, 2) to boxes and to blocked discs (rows x, y, radius).
+
+        At most `comfort_m`.
+        """
+        out = self.boxes.distances(points)
         for x, y, radius in self.blocked:
-            np.minimum(out, np.hypot(points[..., 0] - x, points[..., 1] - y) - radius, out=out)
+            np.minimum(out, np.hypot(points[:, 0] - x, points[:, 1] - y) - radius, out=out)
         return out
 
     def nearest_free(self, point: FloatArray, what: str) -> int:
@@ -103,7 +118,7 @@ class _Grid:
             )
         return cell
 
-    def ways(self) -> tuple[IntArray, IntArray, FloatArray]:
+    def ways(self) -> tuple[IndexArray, IndexArray, FloatArray]:
         """Pairs of neighbouring free cells, one of each two ways, and what they cost."""
         index = np.arange(self.cells).reshape(self.shape)
         starts, stops, costs = [], [], []
@@ -147,7 +162,7 @@ def plan_path(
     from scipy.sparse.csgraph import dijkstra
 
     config = config or PlanningConfig()
-    ends = np.array([start, goal], dtype=np.float64)
+    ends = np.stack([as_place(start, "a start"), as_place(goal, "a goal")])
     grid = _Grid(world, config, np.asarray(blocked, dtype=np.float64).reshape(-1, 3))
     first, last = grid.nearest_free(ends[0], "start"), grid.nearest_free(ends[1], "goal")
     a, b, costs = grid.ways()
@@ -255,34 +270,9 @@ def fit_path(
     return plan_path(world, points[0], points[-1], config, discs)
 
 
-def resampled(path: npt.ArrayLike, spacing: float) -> FloatArray:
-    """Points along a path at equal distances.
-
-    Args:
-        path: (k, 2) corners of the path [m].
-        spacing: About how far the points are to be from each other, measured along it [m].
-
-    Returns:
-        (n, 2), the first and the last point kept; one point where the path has no length.
-
-    Raises:
-        UsageError: The path has another shape, no point, or numbers that are not finite.
-    """
-    points = np.asarray(path, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0:
-        raise UsageError(f"a path must be points (k, 2), got {points.shape}")
-    if not np.isfinite(points).all():
-        raise UsageError("a path must have finite points")
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    if along[-1] == 0.0:
-        return points[:1].copy()
-    at = np.linspace(0.0, along[-1], max(2, round(along[-1] / spacing) + 1))
-    return np.stack([np.interp(at, along, points[:, axis]) for axis in range(2)], axis=1)
-
-
 def _near(
-    grid: _Grid, points: FloatArray, inside: list[IntArray], first: int, last: int
-) -> tuple[IntArray, FloatArray]:
+    grid: _Grid, points: FloatArray, inside: list[IndexArray], first: int, last: int
+) -> tuple[IndexArray, FloatArray]:
     """States around a sketch: layer * cells + cell, ascending; distances to its points.
 
     Args:

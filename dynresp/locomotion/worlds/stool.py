@@ -13,8 +13,9 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.worlds.contacts import BoolArray, feet_on, sole_corners
+from dynresp.locomotion.worlds.contacts import feet_on, sole_corners
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, box_distance
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.ground import ContactConfig

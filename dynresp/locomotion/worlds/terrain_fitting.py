@@ -18,9 +18,10 @@ from dynresp.errors import UsageError
 from dynresp.locomotion.playing.composing import Composition, compose
 from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
-from dynresp.locomotion.worlds.terrain_graph import IntArray, TerrainGraph, runs
+from dynresp.locomotion.worlds.terrain_graph import TerrainGraph, runs
 from dynresp.locomotion.worlds.terrain_walk import TerrainWalk
 from dynresp.motion import legs, rotations
+from dynresp.motion.arrays import LongArray
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.foot_fitting import FitConfig
 from dynresp.motion.motion import FEET, Motion
@@ -115,7 +116,7 @@ def compose_on_terrain(
     return Composition(played.frames, fitted, played.jumps, walk.placements, played.sliding)
 
 
-def walk_blocks(walk: TerrainWalk, rate: float, motion: Motion) -> IntArray:
+def walk_blocks(walk: TerrainWalk, rate: float, motion: Motion) -> LongArray:
     """The block on which each foot of a composed walk is to stand.
 
     Args:
@@ -132,7 +133,7 @@ def walk_blocks(walk: TerrainWalk, rate: float, motion: Motion) -> IntArray:
     return np.where(motion.contacts[..., None], walk.blocks[nearest], -1)
 
 
-def footing(character: Character, terrain: Terrain, motion: Motion, blocks: IntArray) -> Footing:
+def footing(character: Character, terrain: Terrain, motion: Motion, blocks: LongArray) -> Footing:
     """Check how feet stand.
 
     Args:
@@ -169,7 +170,7 @@ def _put_on_blocks(
     character: Character,
     terrain: Terrain,
     motion: Motion,
-    blocks: IntArray,
+    blocks: LongArray,
     config: TerrainFitConfig,
 ) -> FloatArray:
     """Poses (n, 59) with every stance on its block."""
@@ -187,14 +188,14 @@ def _put_on_blocks(
             shift[rows, foot, 2] = top - soles[rows, foot, :, 2].min(axis=1)
         _pass_on(shift[:, foot], stances)
         _raise(terrain, soles[:, foot], shift[:, foot], stances, motion.fps, config)
-    root = _smooth(shift.mean(axis=1), motion.fps, config.follow_s)
+    root = smoothed(shift.mean(axis=1), motion.fps, config.follow_s)
     root[:, 2] -= _lowering(character, states, ankles + shift, root, motion.fps, config)
     poses = np.array(motion.poses)
     poses[:, :3] += root
     return legs.place_ankles(character, poses, ankles + shift)
 
 
-def drawn_in(terrain: Terrain, block: IntArray, sole: FloatArray, edge: float) -> FloatArray:
+def drawn_in(terrain: Terrain, block: LongArray, sole: FloatArray, edge: float) -> FloatArray:
     """(2,) the least shift that takes a sole away from edges at which the height changes [m].
 
     Args:
@@ -222,7 +223,7 @@ def drawn_in(terrain: Terrain, block: IntArray, sole: FloatArray, edge: float) -
     return shift
 
 
-def _level(terrain: Terrain, block: IntArray) -> int | None:
+def _level(terrain: Terrain, block: LongArray) -> int | None:
     """Level of a block; None beside the grid."""
     if np.all((block >= 0) & (block < terrain.levels.shape)):
         return int(terrain.levels[tuple(block)])
@@ -262,7 +263,7 @@ def _raise(
     wanted = need + config.clear_m * rotations.ease(np.minimum(away / half, 1.0))
     wanted = np.where(stands, 0.0, np.maximum(wanted, 0.0))
     highest = ndimage.maximum_filter1d(wanted, 2 * half + 1, mode="nearest")
-    raised = _smooth(highest[:, None], fps, 2.0 * config.lift_s)[:, 0]
+    raised = smoothed(highest[:, None], fps, 2.0 * config.lift_s)[:, 0]
     shift[:, 2] += np.minimum(raised, config.climb * away / fps)
 
 
@@ -290,10 +291,10 @@ def _lowering(
         need = np.maximum(need, away[:, 2] - np.sqrt(np.maximum(reach**2 - across, 0.0)))
     half = max(1, round(0.5 * config.follow_s * fps))
     highest = ndimage.maximum_filter1d(need, 2 * half + 1, mode="nearest")
-    return _smooth(highest[:, None], fps, config.follow_s)[:, 0]
+    return smoothed(highest[:, None], fps, config.follow_s)[:, 0]
 
 
-def _smooth(values: FloatArray, fps: float, time_s: float) -> FloatArray:
+def smoothed(values: FloatArray, fps: float, time_s: float) -> FloatArray:
     """Values (n, columns) averaged over a time."""
     half = max(1, round(0.5 * time_s * fps))
     kernel = np.hanning(2 * half + 3)[1:-1]

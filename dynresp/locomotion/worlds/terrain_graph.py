@@ -15,10 +15,9 @@ from dynresp.locomotion.graph.config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
+from dynresp.motion.arrays import LongArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
-
-IntArray = npt.NDArray[np.int64]
 
 # A sole is flat if its heel is no higher than its ball by this [m], and the other way round.
 _FLAT = 0.03
@@ -107,7 +106,7 @@ class TerrainGraph:
 
     def standing(
         self, terrain: Terrain, frame: int, cell: npt.ArrayLike, turns: int
-    ) -> IntArray | None:
+    ) -> LongArray | None:
         """The place at which all standing feet of a frame stand on blocks, if there is one.
 
         Args:
@@ -125,14 +124,14 @@ class TerrainGraph:
         place[2] = levels[0]
         return place
 
-    def meters(self, terrain: Terrain, places: IntArray) -> FloatArray:
+    def meters(self, terrain: Terrain, places: LongArray) -> FloatArray:
         """Placements (..., 4) of places (..., 4) on a terrain."""
         out = places * self._unit
         out[..., :2] += terrain.corner
         out[..., 3] = placement.wrapped(out[..., 3])
         return np.asarray(out)
 
-    def place(self, terrain: Terrain, at: npt.ArrayLike) -> IntArray:
+    def place(self, terrain: Terrain, at: npt.ArrayLike) -> LongArray:
         """The place (4,) of a placement (4,) on a terrain.
 
         Raises:
@@ -150,7 +149,7 @@ class TerrainGraph:
 
     def blocks_under(
         self, terrain: Terrain, frames: npt.ArrayLike, placements: FloatArray
-    ) -> IntArray:
+    ) -> LongArray:
         """The block on which each foot stands.
 
         Args:

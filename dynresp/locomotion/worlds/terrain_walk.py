@@ -22,10 +22,12 @@ import numpy.typing as npt
 from dynresp.errors import UsageError
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.walk import check_in_component
-from dynresp.locomotion.sketch.search import State
-from dynresp.locomotion.worlds.planning import resampled
+from dynresp.locomotion.playing.state import State
+from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled, window_m
+from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.locomotion.worlds.terrain import Terrain
-from dynresp.locomotion.worlds.terrain_graph import IntArray, TerrainGraph
+from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
+from dynresp.motion.arrays import LongArray
 from dynresp.motion.rotations import FloatArray
 
 # Distance of the points of a path [m].
@@ -87,6 +89,7 @@ class TerrainWalkConfig:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
+        check_numbers(self)
         if not 0 <= self.facing < 1:
             raise UsageError(f"facing must be at least 0 and below 1, got {self.facing}")
         for name in ("ahead_m", "pace", "stray", "jump", "hurry", "adapt", "stretch", "draw_m",
@@ -121,7 +124,7 @@ class TerrainWalk:
     frames: npt.NDArray[np.int32]
     placements: FloatArray
     roots: FloatArray
-    blocks: IntArray
+    blocks: LongArray
     arrived: bool
     off_goal: float
     looked: int
@@ -150,7 +153,7 @@ def start_on_terrain(
     """
     graph.check(terrain)
     small = dataclasses.replace(config or TerrainWalkConfig(), budget=_STRETCH_BUDGET)
-    here, goal = (np.asarray(x, dtype=np.float64)[:2] for x in (at, toward))
+    here, goal = as_place(at, "a start"), as_place(toward, "a place to face")
     frames = graph.graph.frames
     frames = frames[graph.stands[frames].any(axis=1)]
     cells, costs = [], []
@@ -197,8 +200,8 @@ def reach_on_terrain(
     Raises:
         UsageError: The start does not stand on the blocks, or the goal is not on the grid.
     """
-    end = np.asarray(goal, dtype=np.float64)
-    if end.shape != (2,) or np.isnan(terrain.height(end)):
+    end = as_place(goal, "a goal")
+    if np.isnan(terrain.height(end)):
         raise UsageError(
             f"a goal must be x and y inside the grid of {terrain.size[0]:g} x "
             f"{terrain.size[1]:g} m, got {end}"
@@ -227,9 +230,11 @@ def follow_on_terrain(
         UsageError: The start does not stand on the blocks, or the sketch is none.
     """
     root = start.root(graph.graph)[:2]
-    points = resampled(np.asarray(sketch, dtype=np.float64), _SPACING)
-    if np.hypot(*(points[0] - root)) > 2.0 * _SPACING:
-        points = resampled(np.concatenate([root[None], points]), _SPACING)
+    corners = as_path(sketch, "a sketch")
+    if np.hypot(*(corners[0] - root)) > 2.0 * _SPACING:
+        corners = np.concatenate([root[None], corners])
+    check_length(corners, "the sketch, from where the avatar is on,")
+    points = resampled(corners, _SPACING)
     return _search(graph, terrain, start, points, config or TerrainWalkConfig())
 
 
@@ -326,7 +331,7 @@ def _search(
 
 def _begin(
     graph: TerrainGraph, terrain: Terrain, start: State, config: TerrainWalkConfig
-) -> tuple[IntArray, tuple[npt.NDArray, ...], FloatArray]:  # type: ignore[type-arg]
+) -> tuple[LongArray, tuple[npt.NDArray, ...], FloatArray]:  # type: ignore[type-arg]
     """The place, the feet and the settings with which a kernel begins."""
     from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
 
@@ -353,6 +358,7 @@ def _begin(
     settings[kernel.SPACING], settings[kernel.BLOCK] = _SPACING, terrain.block_m
     settings[kernel.FRAME_TIME] = 1.0 / graph.graph.database.fps
     settings[kernel.ARRIVAL] = config.arrival_m
+    settings[kernel.WINDOW] = np.ceil(window_m(graph.graph.database.fps) / _SPACING)
     over = graph.over + config.edge_m
     over.flags.writeable = False
     return (
@@ -365,7 +371,7 @@ def _begin(
 def _walk(
     graph: TerrainGraph,
     terrain: Terrain,
-    frames: IntArray,
+    frames: LongArray,
     placements: FloatArray,
     arrived: bool,
     goal: FloatArray,

@@ -19,18 +19,18 @@ from numba import njit, types
 from numba.typed import Dict
 
 from dynresp.compiling import compiled
+from dynresp.growing import doubled
+from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
 
 (
     PACE, STRAY, JUMP, HASTE, HURRY, STRETCH, DRAW, FACING, AHEAD, FARTHEST,
-    ADAPT, REACH, SPACING, FRAME_TIME, BLOCK, ARRIVAL, GREED, SETTINGS,
-) = range(18)  # fmt: skip
+    ADAPT, REACH, SPACING, FRAME_TIME, BLOCK, ARRIVAL, GREED, WINDOW, SETTINGS,
+) = range(19)  # fmt: skip
 """Entries of `settings`, and how many there are."""
 
 COLUMN, ROW, LEVEL, TURNS, LEFT, RIGHT, PLACE = range(7)
 """Entries of a place: where a clip is put, then the lifts of both feet; and how many there are."""
 
-# Points of the path in which the next nearest one is looked for, before the last one and beyond.
-_BACK, _ON = 2, 8
 # Room for one key: frames, and columns and rows from this far beside the grid.
 _WRAP, _BESIDE = 1 << 20, 1 << 10
 
@@ -165,40 +165,12 @@ def _root(planar, frame, place, block):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _nearest_on(path, x, y, progress, spacing):  # type: ignore[no-untyped-def]
-    """The point of the path nearest to x, y, not far from `progress`: (points, distance)."""
-    last = len(path) - 1
-    if last == 0:
-        return 0.0, math.hypot(x - path[0, 0], y - path[0, 1])
-    first = min(max(int(progress) - _BACK, 0), last - 1)
-    stop = min(int(progress) + _ON, last)
-    least, nearest = math.inf, progress
-    for k in range(first, max(stop, first + 1)):
-        along_x, along_y = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
-        away_x, away_y = x - path[k, 0], y - path[k, 1]
-        share = (along_x * away_x + along_y * away_y) / (spacing * spacing)
-        share = min(max(share, 0.0), 1.0)
-        off = math.hypot(away_x - share * along_x, away_y - share * along_y)
-        if off < least:
-            least, nearest = off, k + share
-    return nearest, least
-
-
-@njit
-def _objective(path, x, y, yaw, progress, away, settings):  # type: ignore[no-untyped-def]
-    """Eq. 8 with the way left along the path in place of the straight distance [m]."""
-    last = len(path) - 1
-    goal = min(progress + settings[AHEAD] / settings[SPACING], float(last))
-    k = min(int(goal), max(last - 1, 0))
-    on = min(k + 1, last)
-    to_x = path[k, 0] + (goal - k) * (path[on, 0] - path[k, 0]) - x
-    to_y = path[k, 1] + (goal - k) * (path[on, 1] - path[k, 1]) - y
-    straight = math.hypot(to_x, to_y)
-    left = (last - progress) * settings[SPACING] + away
-    if straight < 1e-9:
-        return left
-    faces = (to_x * math.cos(yaw) + to_y * math.sin(yaw)) / straight
-    return left * (1.0 - settings[FACING] * faces)
+def _value(path, x, y, yaw, progress, away, settings):  # type: ignore[no-untyped-def]
+    """Eq. 8 to the end of the path [m]."""
+    return eq_8(
+        path, x, y, math.cos(yaw), math.sin(yaw), progress, len(path) - 1.0, away,
+        settings[AHEAD], settings[FACING], settings[SPACING],
+    )  # fmt: skip
 
 
 @njit
@@ -207,12 +179,6 @@ def _key(frame, place):  # type: ignore[no-untyped-def]
     key = np.int64(frame) * 4 + place[TURNS]
     key = key * _WRAP + place[COLUMN] + _BESIDE
     return key * _WRAP + place[ROW] + _BESIDE
-
-
-@njit
-def _more(array):  # type: ignore[no-untyped-def]
-    """The array with as much room again."""
-    return np.concatenate((array, np.empty_like(array)))
 
 
 @compiled(
@@ -249,8 +215,8 @@ def search_kernel(start, begin, settings, path, budget, graph, planar, feet, gri
     frames[0], parents[0], ages[0], costs[0] = start, -1, 1 << 20, 0.0
     places[0] = begin
     x, y, yaw = _root(planar, start, begin, settings[BLOCK])
-    done[0], away = _nearest_on(path, x, y, 0.0, settings[SPACING])
-    least = _objective(path, x, y, yaw, done[0], away, settings)
+    done[0], away = nearest_on(path, x, y, 0.0, settings[WINDOW])
+    least = _value(path, x, y, yaw, done[0], away, settings)
     best[_key(start, begin)] = 0.0
     heap = [(least, np.int64(0))]
     count, nearest, looked, arrived = 1, np.int64(0), 0, False
@@ -273,7 +239,7 @@ def search_kernel(start, begin, settings, path, budget, graph, planar, feet, gri
                 cost += settings[JUMP] * distances[way] + settings[HURRY] * soon
                 age = 0
             x, y, yaw = _root(planar, entry, place, settings[BLOCK])
-            progress, away = _nearest_on(path, x, y, done[node], settings[SPACING])
+            progress, away = nearest_on(path, x, y, done[node], settings[WINDOW])
             stray = 0.0
             if last > 0:
                 if away > settings[FARTHEST]:
@@ -284,12 +250,11 @@ def search_kernel(start, begin, settings, path, budget, graph, planar, feet, gri
             if key in best and best[key] <= cost:
                 continue
             best[key] = cost
-            value = _objective(path, x, y, yaw, progress, away, settings)
+            value = _value(path, x, y, yaw, progress, away, settings)
             if count == room:
                 room *= 2
-                frames, parents, ages = _more(frames), _more(parents), _more(ages)
-                costs, done = _more(costs), _more(done)
-                places = np.concatenate((places, np.empty_like(places)))
+                frames, parents, ages = doubled(frames), doubled(parents), doubled(ages)
+                costs, done, places = doubled(costs), doubled(done), doubled(places)
             frames[count], parents[count], ages[count] = entry, node, age
             places[count], costs[count], done[count] = place, cost, progress
             near = math.hypot(x - path[last, 0], y - path[last, 1]) <= settings[ARRIVAL]

@@ -2,28 +2,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import gaussian_filter1d
 
+from dynresp.bench import graph_mazes, graph_sketch
 from dynresp.errors import DynrespError, UsageError
+from dynresp.graphs.sketching import standing_at
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.clusters.grouping import Clusters
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.blending import Playback
+from dynresp.locomotion.playing.state import State
 from dynresp.locomotion.sketch.cluster_paths import SketchChooser
-from dynresp.locomotion.sketch.following import (
-    SketchConfig,
-    SketchedWalk,
-    distances_to,
-    follow_sketch,
-    reach,
-)
-from dynresp.locomotion.sketch.search import SearchGraph, State
-from dynresp.locomotion.worlds.maze import Maze, MazeConfig, random_maze
+from dynresp.locomotion.sketch.following import follow_sketch, reach
+from dynresp.locomotion.sketch.search import SearchGraph
+from dynresp.locomotion.sketch.walking import SketchConfig, SketchedWalk
+from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
-from dynresp.locomotion.worlds.planning import resampled
+from dynresp.locomotion.worlds.paths import distances_to, resampled
+from dynresp.motion.builtin import FLAT, load_builtin
 from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.rotations import FloatArray
@@ -34,6 +31,13 @@ from tests.locomotion.samples import walking_graph
 def straight() -> SearchGraph:
     """The built-in walk: it can only go straight on."""
     return SearchGraph(walking_graph(default_character(), sigma=0.3))
+
+
+@pytest.fixture(scope="module")
+def made() -> SearchGraph:
+    """All that the product makes itself on level ground: bends, about turns, side steps."""
+    motions = [load_builtin(name, default_character()) for name in FLAT]
+    return SearchGraph(MotionGraph.build(motions, GraphConfig(mirrored=True)))
 
 
 @pytest.fixture(scope="module")
@@ -53,24 +57,6 @@ def walker(motions_folder: Path) -> SearchGraph:
 def standing(tables: SearchGraph, x: float, y: float, yaw: float) -> State:
     frames = np.flatnonzero(tables.still) if tables.still.any() else tables.graph.frames
     return State.at(tables.graph, int(frames[len(frames) // 3]), x, y, yaw)
-
-
-def smooth_path(rng: np.random.Generator) -> FloatArray:
-    """20 m with random bends of more than a metre's radius."""
-    steps = 400
-    bend = gaussian_filter1d(rng.normal(0.0, 1.0, steps + 200), 30)[100:-100]
-    bend *= 0.8 * rng.random() / np.abs(bend).max()
-    heading = rng.uniform(-np.pi, np.pi) + np.cumsum(bend) * 20.0 / steps
-    ways = np.stack([np.cos(heading), np.sin(heading)], axis=1) * 20.0 / steps
-    return np.concatenate([[(0.0, 0.0)], np.cumsum(ways, axis=0)])
-
-
-def rough_sketch(rng: np.random.Generator, maze: Maze, noise_m: float = 0.3) -> FloatArray:
-    """A wavering line along the solution of a maze, which may cut its walls."""
-    corners = resampled(maze.solution, 0.9)
-    moved = corners + rng.normal(0.0, noise_m, corners.shape)
-    moved[[0, -1]] = corners[[0, -1]]
-    return CubicSpline(np.arange(len(moved)), moved)(np.linspace(0, len(moved) - 1, 200))
 
 
 def clearance(tables: SearchGraph, walk: SketchedWalk, world: World) -> float:
@@ -135,66 +121,172 @@ def test_where_no_way_is_the_walk_ends(straight: SearchGraph) -> None:
         reach(straight, start, (6.0, 0.0), closed)
 
 
+def circle(radius: float, rounds: float = 1.0) -> FloatArray:
+    """Closed, beginning at the origin along x."""
+    at = np.linspace(0.0, 2.0 * np.pi * rounds, round(60 * rounds))
+    return radius * np.stack([np.sin(at), 1.0 - np.cos(at)], axis=1)
+
+
+def eight(size: float) -> FloatArray:
+    """A figure eight that begins at its crossing."""
+    at = np.linspace(0.0, 2.0 * np.pi, 120)
+    return size * np.stack([np.sin(at), np.sin(at) * np.cos(at)], axis=1)
+
+
+PATHS = {
+    "there and back": [(0, 0), (3, 0), (0, 0), (3, 0)],
+    "to and fro": [(0, 0), (1, 0), (0, 0), (1, 0), (0, 0)],
+    "a spike": [(0, 0), (2, 0), (2, 1), (2, 0), (4, 0)],
+    "a zigzag": [(0, 0), (3, 0), (0, 0.5), (3, 1), (0, 1.5)],
+    "a circle": circle(1.0),
+    "three rounds": circle(1.5, 3.0),
+    "an eight": eight(1.5),
+    "twice around a square": [(0, 0), (3, 0), (3, 3), (0, 3), (0, 0)] * 2,
+    "through its own crossing": [(0, 0), (4, 0), (4, 2), (2, 2), (2, -2)],
+    "corners twice": [(0, 0), (0, 0), (1, 0), (1, 0), (1, 0), (3, 1), (3, 1)],
+    "0.2 m": [(0, 0), (0.2, 0)],
+    "0.1 m": [(0, 0), (0.1, 0)],
+    "no length": [(0, 0), (0, 0)],
+    "one corner": [(0, 0)],
+}
+
+
+def check_follows(tables: SearchGraph, corners: object, away: float) -> None:
+    """The whole of a path is walked, whatever way the avatar faces at first."""
+    path = np.array(corners, dtype=float)
+    ahead = path[np.hypot(*path.T) > 0.01][:1]
+    heading = float(np.arctan2(*ahead[0][::-1])) if len(ahead) else 0.0
+    start = standing_at(tables.graph, (0.0, 0.0), (np.cos(heading + away), np.sin(heading + away)))
+    walk = follow_sketch(tables, start, path)
+    check_walk(tables, walk)
+    assert walk.arrived
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    assert np.hypot(*(walk.roots[-1, :2] - path[-1])) <= min(0.25, max(0.5 * length, 0.05))
+    # Who faces away at first turns round beside the path.
+    assert walk.off_path.mean() < (0.3 if away else 0.2)
+    assert walk.off_path.max() < 1.0
+    # Every place of the path is come by, and in its order: nothing of it is left out.
+    points = resampled(path, 0.1)
+    if len(points) > 5:
+        at = [np.hypot(*(points - root).T) <= 0.7 for root in walk.roots[:, :2]]
+        done = 0
+        for near in at:
+            while done < len(points) and near[done]:
+                done += 1
+        assert done == len(points)
+
+
+@pytest.mark.parametrize("away", [0.0, np.pi])
+@pytest.mark.parametrize("name", PATHS)
+def test_paths_of_all_kinds_are_followed(made: SearchGraph, name: str, away: float) -> None:
+    check_follows(made, PATHS[name], away)
+
+
+@pytest.mark.slow
+@pytest.mark.mocap
+@pytest.mark.parametrize("away", [0.0, 0.5 * np.pi, np.pi])
+@pytest.mark.parametrize("name", PATHS)
+def test_paths_of_all_kinds_are_followed_by_people(
+    walker: SearchGraph, name: str, away: float
+) -> None:
+    check_follows(walker, PATHS[name], away)
+
+
+@pytest.mark.slow
+def test_a_kilometre(made: SearchGraph) -> None:
+    path = [(0.0, 0.0), *((10.0 * k, 2.0 * (-1) ** k) for k in range(1, 92))]
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    assert 950.0 < length < 1000.0
+    walk = follow_sketch(made, standing_at(made.graph, (0.0, 0.0), path[1]), path)
+    assert walk.arrived
+    assert walk.off_path.mean() < 0.15
+    assert (len(walk.frames) - 1) / 15.0 / walk.planning_s > 10.0
+
+
+def test_progress_is_told(straight: SearchGraph) -> None:
+    told: list[tuple[str, int, int]] = []
+
+    def tell(stage: str, done: int, of: int) -> None:
+        told.append((stage, done, of))
+
+    start = standing(straight, 0, 0, 0)
+    follow_sketch(straight, start, [(0.0, 0.0), (6.0, 0.0)], progress=tell)
+    assert {stage for stage, _, _ in told} == {"looking for a way"}
+    done = [done for _, done, _ in told]
+    assert done == sorted(done)
+    assert done[0] == 0
+    assert {of for _, _, of in told} == {60}
+    told.clear()
+    world = World((-2.0, -3.0, 9.0, 3.0), (Obstacle((3.0, 0.0), (0.3, 0.3)),))
+    reach(straight, start, (6.0, 0.0), world, progress=tell)
+    stages = [stage for stage, _, _ in told]
+    assert stages[0] == "looking for a path between the obstacles"
+    assert "there is none at hand, looking farther" in stages
+
+
 def test_what_makes_no_sense(straight: SearchGraph) -> None:
     with pytest.raises(UsageError, match="horizon_m must be above 0"):
         SketchConfig(horizon_m=0.0)
     start = standing(straight, 0, 0, 0)
     with pytest.raises(UsageError, match=r"points \(k, 2\)"):
         follow_sketch(straight, start, [1.0, 2.0])
-    with pytest.raises(UsageError, match="a goal must be two finite numbers"):
+    with pytest.raises(UsageError, match=r"a sketch must be points \(k, 2\), got 'abc'"):
+        follow_sketch(straight, start, "abc")
+    with pytest.raises(UsageError, match="two finite numbers"):
         reach(straight, start, (1.0, np.nan))
+    with pytest.raises(UsageError, match="is 1001 m long; at most 1000 m"):
+        reach(straight, start, (1001.0, 0.0))
+    with pytest.raises(UsageError, match="is 1020 m long; at most 1000 m"):
+        follow_sketch(straight, start, [(510.0, 0.0), (0.0, 0.0)])
 
 
-def test_distances_to_a_path() -> None:
-    path = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
-    points = np.array([(-1.0, 0.0), (1.0, 0.5), (2.5, 1.0), (1.0, 3.0)])
-    np.testing.assert_allclose(distances_to(path, points), [1.0, 0.5, 0.5, np.sqrt(2.0)])
+def test_what_is_of_another_kind(straight: SearchGraph) -> None:
+    start, path = standing(straight, 0, 0, 0), [(0.0, 0.0), (1.0, 0.0)]
+    with pytest.raises(UsageError, match=r"SearchGraph\(graph\), got MotionGraph"):
+        follow_sketch(straight.graph, start, path)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="the start must be a State"):
+        follow_sketch(straight, path, start)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="the world must be a World of boxes, or None, got list"):
+        follow_sketch(straight, start, path, [])  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="the configuration must be a SketchConfig"):
+        reach(straight, start, (1.0, 0.0), None, {})  # type: ignore[arg-type]
+    for wrong in (np.nan, np.inf, "a", None):
+        with pytest.raises(UsageError, match="finite x, y"):
+            State.at(straight.graph, start.frame, 0.0, wrong, 0.0)  # type: ignore[arg-type]
+    for frame in (-1, len(straight.graph.database)):
+        with pytest.raises(UsageError, match="the graph has frames 0 to"):
+            State.at(straight.graph, frame, 0.0, 0.0, 0.0)
+    with pytest.raises(UsageError, match="a state needs a frame"):
+        State.at(straight.graph, 1.5, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
 @pytest.mark.mocap
 def test_smooth_paths_of_20_m_in_open_ground(walker: SearchGraph) -> None:
-    off, ratios = [], []
-    for seed in range(50):
-        path = smooth_path(np.random.default_rng(seed))
-        heading = np.arctan2(*(path[5] - path[0])[::-1])
-        stop = seed % 2 == 1
-        walk = follow_sketch(
-            walker, standing(walker, 0, 0, heading), path, config=SketchConfig(stop=stop)
-        )
-        assert walk.arrived
-        assert np.hypot(*(walk.roots[-1, :2] - path[-1])) <= 0.25
-        assert not stop or walker.still[walk.frames[-1]]
-        if seed < 5:
-            check_walk(walker, walk)
-        off.append(walk.off_path.mean())
-        ratios.append(len(walk.frames) / 15.0 / walk.planning_s)
-    assert np.max(off) < 0.25
-    assert np.mean(off) < 0.12
-    # A busy machine takes longer; usually it is some hundred times real time.
-    assert np.median(ratios) > 20.0
+    graph_sketch.warm_up(walker)
+    followed = graph_sketch.follow_smooth_paths(walker, 50, 0)
+    for one in followed:
+        assert one.walk.arrived
+        assert np.hypot(*(one.walk.roots[-1, :2] - one.path[-1])) <= 0.25
+        assert not one.stop or walker.still[one.walk.frames[-1]]
+        assert one.walk.off_path.mean() < 0.25
+    for one in followed[:5]:
+        check_walk(walker, one.walk)
+    assert np.mean([one.walk.off_path.mean() for one in followed]) < 0.12
+    assert graph_sketch.real_time_ratios([one.walk for one in followed], 15.0).min() >= 10.0
 
 
 @pytest.mark.slow
 @pytest.mark.mocap
 @pytest.mark.parametrize("sketched", [True, False])
 def test_mazes(walker: SearchGraph, sketched: bool) -> None:
-    ratios = []
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        maze = random_maze(rng)
-        sketch = rough_sketch(rng, maze)
-        way = maze.solution[1] - maze.solution[0]
-        start = standing(walker, *maze.solution[0], float(np.arctan2(way[1], way[0])))
-        if sketched:
-            walk = follow_sketch(walker, start, sketch, maze.world)
-        else:
-            walk = reach(walker, start, maze.solution[-1], maze.world)
-        assert walk.arrived
-        assert np.hypot(*(walk.roots[-1, :2] - maze.solution[-1])) <= 0.25
-        assert clearance(walker, walk, maze.world) > 0.0
-        ratios.append(len(walk.frames) / 15.0 / walk.planning_s)
-    assert np.median(ratios) > 20.0
+    graph_sketch.warm_up(walker)
+    walked = graph_mazes.walk_mazes(walker, 20, 0, sketched)
+    for one in walked:
+        assert one.walk.arrived
+        assert np.hypot(*(one.walk.roots[-1, :2] - one.maze.solution[-1])) <= 0.25
+        assert graph_mazes.clearance(walker.graph, walker.character, one) > 0.0
+    assert graph_sketch.real_time_ratios([one.walk for one in walked], 15.0).min() >= 10.0
 
 
 @pytest.mark.slow
@@ -235,7 +327,7 @@ def test_actions_chosen_by_warping_follow_a_sketch_too(walker: SearchGraph) -> N
     chooser = SketchChooser(ClusterForest(graph, Clusters.of(graph)))
     off = []
     for seed in range(5):
-        path = resampled(smooth_path(np.random.default_rng(seed)), 0.1)
+        path = resampled(graph_sketch.smooth_path(np.random.default_rng(seed)), 0.1)
         heading = np.arctan2(*(path[5] - path[0])[::-1])
         start = standing(walker, 0, 0, heading)
         playback, done = Playback(graph, start.frame, start.placement), 0

@@ -5,10 +5,11 @@ from dynresp.errors import UsageError
 from dynresp.locomotion.graph.config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.sketch.search import Found, SearchConfig, SearchGraph, State
+from dynresp.locomotion.playing.state import State
+from dynresp.locomotion.sketch.search import Found, SearchConfig, SearchGraph
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
-from dynresp.locomotion.worlds.planning import resampled
+from dynresp.locomotion.worlds.paths import resampled
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 from tests.locomotion.graph.graph_samples import made_database
@@ -66,6 +67,24 @@ def test_it_equals_its_slow_twin(seed: int, boxes: bool, character: Character) -
     frames, arrived, looked = twin.run(start, 0.0, 150)
     assert (found.arrived, found.looked) == (arrived, looked)
     assert found.frames.tolist() == frames
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_equals_its_slow_twin_on_paths_that_turn_back(seed: int, character: Character) -> None:
+    rng = np.random.default_rng([seed, 9])
+    graph = made_graph(seed)
+    tables = SearchGraph(graph, character)
+    start = State.at(graph, int(rng.choice(graph.frames)), 0.0, 0.0, 0.3)
+    path = resampled([(0, 0), (0.7, 0.1), (0.7, 0.1), (0, 0), rng.uniform(-0.5, 0.5, 2)], SPACING)
+    config = SearchConfig(stray=3.0, jump=0.3)
+    target = len(path) - 1.5
+    found = search(tables, start, path, target, 150, 3, config=config)
+    facing = np.full(len(path), 0.2)
+    twin = oracle.Search(graph, character, path, facing, SPACING, target, config, None, 3)
+    frames, arrived, looked = twin.run(start, 0.0, 150)
+    assert (found.arrived, found.looked) == (arrived, looked)
+    assert found.frames.tolist() == frames
+    assert (np.diff(found.progress) >= 0.0).all()
 
 
 @pytest.mark.parametrize("aside", [0.32, 0.36, 0.4])

@@ -3,7 +3,7 @@ import pytest
 
 from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
-from dynresp.locomotion.worlds.planning import resampled
+from dynresp.locomotion.worlds.paths import resampled
 
 
 @pytest.mark.parametrize("narrow", [0.0, 0.5])

@@ -112,17 +112,39 @@ def test_what_is_no_world() -> None:
         World((1.0, 0.0, 0.0, 2.0))
 
 
+@pytest.mark.parametrize("wrong", ["ab", None, 3.0, (1.0,), (1.0, "x"), [(1.0, 2.0)], (1, 2, 3)])
+def test_what_is_no_box_and_no_bounds(wrong: object) -> None:
+    with pytest.raises(UsageError, match="finite place, got"):
+        Obstacle(wrong, (1.0, 1.0))  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="sizes of an obstacle must be above 0"):
+        Obstacle((0.0, 0.0), wrong)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="bounds must be"):
+        World(wrong)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="must be"):
+        World((0.0, 0.0, 1.0, 1.0), wrong)  # type: ignore[arg-type]
+
+
 def test_a_world_must_not_be_too_large_for_grids() -> None:
     World((0.0, 0.0, 400.0, 100.0))
-    World((-100.0, -100.0, 100.0, 100.0), (Obstacle((0, 0), (1, 1)),) * 96)
     with pytest.raises(UsageError, match=r"sides of at most 400 m, got 401 x 1 m; cut"):
         World((0.0, 0.0, 401.0, 1.0))
     with pytest.raises(UsageError, match="sides of at most 400 m"):
         World((-1e308, -1e308, 1e308, 1e308))
     with pytest.raises(UsageError, match=r"at most 40000 m2, got 160000 m2"):
         World((0.0, 0.0, 400.0, 400.0))
-    with pytest.raises(UsageError, match=r"may have at most 96 boxes, got 97"):
-        World((-100.0, -100.0, 100.0, 100.0), (Obstacle((0, 0), (1, 1)),) * 97)
+
+
+def test_a_world_must_not_have_too_many_boxes_or_too_large_ones() -> None:
+    bounds = (-100.0, -100.0, 100.0, 100.0)
+    small = Obstacle((0, 0), (0.5, 0.5))
+    assert len(World(bounds, (small,) * 10_000).boxes) == 10_004
+    with pytest.raises(UsageError, match=r"at most 10000 boxes, got 10001; leave out"):
+        World(bounds, (small,) * 10_001)
+    # Of a box only what lies within the bounds counts.
+    World(bounds, (Obstacle((0, 0), (1e200, 1e200), 0.3),) * 25)
+    with pytest.raises(UsageError, match=r"26 boxes are too large .* adds up to 1040000 m2"):
+        World(bounds, (Obstacle((0, 0), (1e200, 1e200), 0.3),) * 26)
+    World(bounds, (Obstacle((1e6, 0), (500, 500)),) * 10_000)
 
 
 def test_grids_must_not_be_too_fine() -> None:
@@ -133,16 +155,24 @@ def test_grids_must_not_be_too_fine() -> None:
         CollisionGrid.of(world, 1.2, cell_m=0.01)
     with pytest.raises(UsageError, match="larger cells"):
         world.grid_shape(1e-300)
-    # Not too many cells, but too many for so many boxes.
-    assert World(world.bounds).grid_shape(0.05) == (2000, 2000)
-    with pytest.raises(UsageError, match=r"304 boxes .* larger cells"):
-        world.grid_shape(0.05)
     with pytest.raises(UsageError, match="side of cells must be above 0 and finite, got 0"):
         world.grid_shape(0.0)
+
+
+def test_a_grid_says_how_far_boxes_are_as_the_world_does(rng: np.random.Generator) -> None:
+    for reach in (0.3, 1.2, 20.0):
+        world = made_world(rng)
+        grid = CollisionGrid.of(world, reach, cell_m=0.17)
+        points = rng.uniform(-4.0, 4.0, (300, 2))
+        expected = np.minimum(world.distances(points), reach)
+        np.testing.assert_allclose(grid.distances(points), expected, atol=1e-12)
+        middles = grid.frame[:2] + 0.17 * (np.argwhere(np.isfinite(grid.clearance)) + 0.5)
+        near = grid.clearance[np.isfinite(grid.clearance)]
+        np.testing.assert_allclose(near, world.distances(middles), atol=1e-6)
 
 
 def test_lists_of_boxes_must_not_be_too_long() -> None:
     # Every box is near to every cell.
     world = World((0.0, 0.0, 40.0, 40.0), (Obstacle((20, 20), (40, 40)),) * 600)
     with pytest.raises(UsageError, match=r"boxes within reach \(1.2 m\) .* leave out"):
-        CollisionGrid.of(world, 1.2)
+        CollisionGrid.of(world, 1.2, cell_m=0.05)

@@ -7,7 +7,8 @@ from dynresp.errors import DynrespError, UsageError
 from dynresp.locomotion.worlds import planning
 from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
-from dynresp.locomotion.worlds.planning import PlanningConfig, fit_path, plan_path, resampled
+from dynresp.locomotion.worlds.paths import resampled
+from dynresp.locomotion.worlds.planning import PlanningConfig, fit_path, plan_path
 
 OPEN = World((-1.0, -3.0, 9.0, 3.0))
 WALL = World((-1.0, -3.0, 9.0, 3.0), (Obstacle((4.0, -1.0), (0.1, 2.0)),))
@@ -92,7 +93,7 @@ def test_grids_that_would_be_too_large_are_refused() -> None:
     with pytest.raises(UsageError, match=r"200 x 200 m in cells of 0.01 m"):
         plan_path(world, (0.0, 0.0), (8.0, 0.0), fine)
     discs = np.zeros((20_000, 3))
-    with pytest.raises(UsageError, match="20005 boxes"):
+    with pytest.raises(UsageError, match="20000 discs in 37500 cells"):
         plan_path(WALL, (0.0, 0.0), (8.0, 0.0), PlanningConfig(resolution_m=0.04), discs)
 
 

@@ -7,10 +7,10 @@ from dynresp.errors import MotionError, UsageError
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.sketch.following import distances_to
-from dynresp.locomotion.sketch.search import State
+from dynresp.locomotion.playing.state import State
 from dynresp.locomotion.worlds.blocks import onto_blocks
 from dynresp.locomotion.worlds.contacts import feet_on, sole_corners
+from dynresp.locomotion.worlds.paths import distances_to
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
 from dynresp.locomotion.worlds.terrain_fitting import (
     TerrainFitConfig,

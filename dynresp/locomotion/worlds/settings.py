@@ -1,0 +1,33 @@
+"""Settings that are numbers: what is none is refused where it is given, not where it is used."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from numbers import Integral, Real
+from typing import Any
+
+from dynresp.errors import UsageError
+
+_KINDS: dict[str, tuple[type, str]] = {
+    "float": (Real, "a finite number"),
+    "int": (Integral, "a whole number"),
+}
+
+
+def check_numbers(settings: Any) -> None:
+    """Check that what a dataclass says to be a `float` or an `int` is one, and finite.
+
+    Args:
+        settings: The dataclass's object.
+
+    Raises:
+        UsageError: A field is not; the message names it.
+    """
+    for field in dataclasses.fields(settings):
+        kind, expected = _KINDS.get(str(field.type), (object, ""))
+        value = getattr(settings, field.name)
+        if not expected:
+            continue
+        if not isinstance(value, kind) or isinstance(value, bool) or not math.isfinite(value):  # type: ignore[arg-type]
+            raise UsageError(f"{field.name} must be {expected}, got {str(value)[:40]!r}")
