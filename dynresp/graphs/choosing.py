@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from dynresp.graphs.outing import Outing
-from dynresp.locomotion.choice.actions import Choice, choices
+from dynresp.graphs.worlds import play_in_world
+from dynresp.locomotion.choice.actions import OfferedAction, choices
 from dynresp.locomotion.choice.control import ChoiceControl
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.clusters.grouping import Clusters
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import wrapped
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.playing.composing import compose
 from dynresp.motion.character import Character
 
 OPTIONS = "options.png"
@@ -24,6 +24,8 @@ OPTIONS = "options.png"
 
 # Without a pick it walks on for so long [s] before it asks again.
 _ON_S = 2.0
+# Who ends nearer than this to where it began stays, or comes back where the way was longer [m].
+_STAYS_M, _AROUND_M = 0.3, 1.5
 
 Pick = Callable[[float, Sequence[str]], int | None]
 """Told the time [s] and the actions in words; answers with the number of one, from 0, or None."""
@@ -57,7 +59,7 @@ def choice_outing(
     control, playback = ChoiceControl(graph, start, rng), Playback(graph, start)
     parts = [np.array([start], dtype=np.int32)]
     told: list[dict[str, Any]] = []
-    offered: tuple[Choice, ...] = ()
+    offered: tuple[OfferedAction, ...] = ()
     played = 0
     while played < seconds * graph.config.fps:
         at_s = played / graph.config.fps
@@ -78,7 +80,7 @@ def choice_outing(
         played += len(way)
     if played == 0:
         parts.append(control.advance(max(1, round(_ON_S * graph.config.fps))))
-    composition = compose(graph, character, np.concatenate(parts), fps=fps)
+    composition = play_in_world(graph, character, np.concatenate(parts), fps)
     picks = sum(moment["picked"] is not None for moment in told)
 
     def options(path: Path) -> None:
@@ -96,14 +98,18 @@ def choice_outing(
     )
 
 
-def in_words(action: Choice, fps: float) -> str:
+def in_words(action: OfferedAction, fps: float) -> str:
     """Where an action leads, how it turns there, and when."""
     first, last = action.path[0], action.path[-1]
     way = last[:2] - first[:2]
     distance = float(np.hypot(*way))
     turn = float(np.degrees(wrapped(last[3] - first[3])))
     bearing = float(np.degrees(wrapped(np.arctan2(way[1], way[0]) - first[3])))
-    where = "stays" if distance < 0.3 else f"goes {distance:.1f} m {_side(bearing)}"
+    length = float(np.hypot(*np.diff(action.path[:, :2], axis=0).T).sum())
+    if distance >= _STAYS_M:
+        where = f"goes {distance:.1f} m {_side(bearing)}"
+    else:
+        where = "stays" if length < _AROUND_M else f"goes {length:.1f} m and comes back"
     turned = "" if abs(turn) < 20.0 else f", turns {abs(turn):.0f} deg {_hand(turn)}"
     return f"{where}{turned}, in {len(action.frames) / fps:.1f} s"
 

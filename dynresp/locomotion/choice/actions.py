@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ from dynresp.locomotion.choice.window import ChoiceWindow
 from dynresp.locomotion.clusters.forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.config import Coordinates
-from dynresp.locomotion.graph.database import IntArray
+from dynresp.motion.arrays import BoolArray, IntArray, frozen
 from dynresp.motion.rotations import FloatArray
 
 # How far to look ahead without an upper bound in time [s]; if need be, half as far again.
@@ -34,7 +35,7 @@ _ENOUGH = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class OfferedAction:
     """An action that is offered.
 
     Attributes:
@@ -70,7 +71,7 @@ def choices(
     frame: int,
     place: npt.ArrayLike = placement.IDENTITY,
     window: ChoiceWindow | None = None,
-) -> tuple[Choice, ...]:
+) -> tuple[OfferedAction, ...]:
     """Actions to choose from.
 
     Args:
@@ -88,7 +89,7 @@ def choices(
     """
     window = window or ChoiceWindow()
     lead, at = forest.branch(frame), np.asarray(place, dtype=np.float64)
-    offered: list[Choice] = []
+    offered: list[OfferedAction] = []
     bounds = list(_bounds(forest, window, len(lead) - 1))
     for most_s in bounds:
         most = forest.depth(most_s)
@@ -114,6 +115,26 @@ def _bounds(forest: ClusterForest, window: ChoiceWindow, waited: int) -> Iterato
         yield bound
         bound *= 1.5
     yield last
+
+
+class _Motion(NamedTuple):
+    """What an action plays.
+
+    Attributes:
+        frames: (s,) from the avatar's own.
+        path: (s, 4) planar states of the root.
+        enters: Index of the first frame in the action's cluster.
+        node: Of the tree.
+        cluster: Its cluster.
+        log_probability: See `OfferedAction`.
+    """
+
+    frames: IntArray
+    path: FloatArray
+    enters: int
+    node: int
+    cluster: int
+    log_probability: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,63 +183,72 @@ class _Candidates:
             nodes = _outermost(tree, nodes)
         root = forest.places_along(lead, place)[-1]
         clip = placement.compose(root, placement.inverse(database.planar[tree.root]))
-        places = placement.compose(clip, forest.places(tree, nodes))
+        places = forest.places(tree, nodes, clip)
         if window.area is not None:
             nodes_inside = _outermost(tree, nodes[window.area.contains(places[:, :2])])
             kept = np.searchsorted(nodes, nodes_inside)
             nodes, places = nodes[kept], places[kept]
         return cls(forest, tree, lead, place, window, least, most, nodes, places)
 
-    def dispersed(self) -> list[Choice]:
+    def dispersed(self) -> list[OfferedAction]:
         """The actions that are farthest from each other, at most as many as wanted."""
         if len(self.nodes) == 0:
             return []
-        means = self.forest.clusters.mixture.means[self.tree.node_clusters[self.nodes]]
-        features = _features(self.places, means)
+        from dynresp.locomotion.choice.dispersing_kernel import farthest_kernel
+
+        clusters, apart = self.tree.node_clusters[self.nodes], self.forest.clusters.apart
         probability = self.tree.log_probabilities[self.tree.node_visits[self.nodes]]
         best = int(np.argmax(probability))
         nearest = np.full(len(self.nodes), np.inf)
-        offered: list[Choice] = []
-        ends = np.empty((0, features.shape[1]))
+        offered: list[_Motion] = []
         # A candidate whose motion turns out to be like one before costs a look, so they are few.
         for _ in range(3 * self.window.wanted):
-            choice = self._told(int(self.nodes[best]))
-            end = _features(choice.path[-1:], means[best][None])
+            motion = self._motion(int(self.nodes[best]))
             nearest[best] = -1.0
-            if len(offered) == 0 or _distances(ends, end).min() >= _ALIKE_M:
-                offered.append(choice)
-                ends = np.vstack([ends, end])
-                nearest = np.minimum(nearest, _distances(features, end))
-            best = int(np.argmax(nearest))
+            if all(_distance(motion, other, apart) >= _ALIKE_M for other in offered):
+                offered.append(motion)
+                best = farthest_kernel(
+                    self.places, frozen(clusters), apart, motion.path[-1], motion.cluster,
+                    _TURNED_M, nearest,
+                )  # fmt: skip
+            else:
+                best = int(np.argmax(nearest))
             if len(offered) == self.window.wanted or nearest[best] < _ALIKE_M:
                 break
-        return offered
+        examples = self.forest.clusters.examples[[motion.cluster for motion in offered]]
+        poses = _shown(self.forest, examples, np.array([motion.path[-1] for motion in offered]))
+        return [
+            OfferedAction(
+                int(self.lead[0]), motion.frames[1:], motion.path, motion.enters - 1,
+                self.tree.cluster_path(motion.node), int(example), pose, motion.log_probability,
+            )
+            for motion, example, pose in zip(offered, examples, poses, strict=True)
+        ]  # fmt: skip
 
-    def _told(self, node: int) -> Choice:
-        """The action of a node: its most probable motion, its stay, and its pose."""
-        forest, tree, area = self.forest, self.tree, self.window.area
+    def _motion(self, node: int) -> _Motion:
+        """What the action of a node plays: its most probable motion, and its stay."""
+        forest, tree = self.forest, self.tree
         waited = len(self.lead) - 1
         left = self.most - waited
-        motion = forest.probable_motion(tree, node, left / forest.graph.database.fps)
-        # The tree's own way comes into the window; the most probable one may not.
-        for way in (motion.frames, tree.way_to(node)):
-            frames = np.concatenate([self.lead[:-1], forest.stay(way, left)])
-            path = forest.places_along(frames, self.place)
+        probable = forest.probable_motion(tree, node, left / forest.graph.database.fps)
+        enters = waited + len(probable.frames) - 1
+        frames, path, inside = self._staying(probable.frames, left)
+        if enters < self.least or not inside[enters:].any():
+            # The most probable way does not come into the window; the tree's own one does.
+            way = tree.way_to(node)
             enters = waited + len(way) - 1
-            inside = np.ones(len(path), dtype=bool)
-            if area is not None:
-                inside = area.contains(path[:, :2])
-            if enters >= self.least and inside[enters:].any():
-                break
+            frames, path, inside = self._staying(way, left)
         stop = int(np.flatnonzero(inside)[-1]) + 1
-        frames, path = frames[:stop], path[:stop]
-        clusters = tree.cluster_path(node)
-        example = int(forest.clusters.examples[clusters[-1]])
-        pose = _shown(forest, example, path[-1])
-        return Choice(
-            int(self.lead[0]), frames[1:], path, enters - 1, clusters, example, pose,
-            motion.log_probability,
-        )  # fmt: skip
+        cluster = int(tree.node_clusters[node])
+        return _Motion(frames[:stop], path[:stop], enters, node, cluster, probable.log_probability)
+
+    def _staying(self, way: IntArray, left: int) -> tuple[IntArray, FloatArray, BoolArray]:
+        """Frames, their places, and whether each is in the window, along a way and its stay."""
+        frames = np.concatenate([self.lead[:-1], self.forest.stay(way, left)])
+        path = self.forest.places_along(frames, self.place)
+        area = self.window.area
+        inside = np.ones(len(path), bool) if area is None else area.contains(path[:, :2])
+        return frames, path, inside
 
 
 def _outermost(tree: ClusterTree, nodes: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
@@ -228,25 +258,23 @@ def _outermost(tree: ClusterTree, nodes: npt.NDArray[np.intp]) -> npt.NDArray[np
     return nodes[~inner[nodes]]
 
 
-def _shown(forest: ClusterForest, example: int, end: FloatArray) -> FloatArray:
-    """(59,) a frame's pose where an action ends; as it was recorded in fixed coordinates."""
+def _shown(forest: ClusterForest, examples: IntArray, ends: FloatArray) -> FloatArray:
+    """(k, 59) poses of frames (k,) where actions end (k, 4).
+
+    In fixed coordinates they are as they were recorded.
+    """
     database, coordinates = forest.graph.database, forest.graph.config.coordinates
-    pose = database.poses[example]
+    poses = database.poses[examples]
     if coordinates is Coordinates.FIXED:
-        return pose
-    at = end.copy()
+        return poses
+    at, planar = ends.copy(), database.planar[examples]
     if coordinates is Coordinates.RELATIVE:
-        at[2] = database.planar[example, 2]
-    put = placement.compose(at, placement.inverse(database.planar[example]))
-    return placement.place_poses(pose[None], put)[0]
+        at[:, 2] = planar[:, 2]
+    return placement.place_poses(poses, placement.compose(at, placement.inverse(planar)))
 
 
-def _features(places: FloatArray, means: FloatArray) -> FloatArray:
-    """(k, d) whose distances say how different actions are [m]."""
-    half = 0.5 * _TURNED_M
-    heading = np.column_stack([half * np.cos(places[:, 3]), half * np.sin(places[:, 3])])
-    return np.hstack([places[:, :2], heading, means])
-
-
-def _distances(features: FloatArray, one: FloatArray) -> FloatArray:
-    return np.sqrt(np.sum((features - one) ** 2, axis=1))
+def _distance(a: _Motion, b: _Motion, apart: FloatArray) -> float:
+    """How different two actions are [m], as the compiled step has it."""
+    x, y, _, yaw = a.path[-1] - b.path[-1]
+    chord = _TURNED_M * math.sin(0.5 * yaw)
+    return math.sqrt(x * x + y * y + chord * chord + apart[a.cluster, b.cluster])

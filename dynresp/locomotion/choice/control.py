@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.choice.actions import Choice
-from dynresp.locomotion.graph.database import IntArray
+from dynresp.locomotion.choice.actions import OfferedAction
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.walk import check_in_component, random_walk
+from dynresp.motion.arrays import IntArray
 
 
 class ChoiceControl:
@@ -35,7 +35,7 @@ class ChoiceControl:
         """Whether frames of a chosen action are still to come."""
         return len(self._chosen) > 0
 
-    def take(self, choice: Choice) -> None:
+    def take(self, choice: OfferedAction) -> None:
         """Do this from now on; it replaces what was chosen before.
 
         Args:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.graph.database import BoolArray
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.rotations import FloatArray
 
 

@@ -28,9 +28,9 @@ import numpy.typing as npt
 from dynresp.errors import UsageError
 from dynresp.locomotion.clusters.grouping import Clusters
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.walk import check_in_component
+from dynresp.motion.arrays import IntArray, frozen
 from dynresp.motion.rotations import FloatArray
 
 TIME_BOUND_S = 15.0
@@ -82,19 +82,15 @@ class ClusterTree:
 
     def cluster_path(self, node: int) -> IntArray:
         """Clusters from the root to a node; neighbours differ."""
-        path = []
-        while node >= 0:
-            path.append(self.node_clusters[node])
-            node = self.node_parents[node]
-        return np.array(path[::-1], dtype=np.int32)
+        from dynresp.locomotion.clusters.forest_kernel import back_kernel
+
+        return back_kernel(self.node_clusters, self.node_parents, node)
 
     def way_to(self, node: int) -> IntArray:
         """Frames from the root to the first of a node, along the tree."""
-        visit, frames = self.node_visits[node], []
-        while visit >= 0:
-            frames.append(self.frames[visit])
-            visit = self.parents[visit]
-        return np.array(frames[::-1], dtype=np.int32)
+        from dynresp.locomotion.clusters.forest_kernel import back_kernel
+
+        return back_kernel(self.frames, self.parents, self.node_visits[node])
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,24 +134,34 @@ class ClusterForest:
         self.clusters = clusters
         self.time_bound_s = time_bound_s
         self._ways = _followed(graph, clusters)
-        self._offsets = _frozen(np.searchsorted(self._ways, graph.offsets))
-        self._targets = _frozen(graph.targets[self._ways])
-        self._logs = _frozen(np.log(graph.probabilities[self._ways]))
+        self._offsets = frozen(np.searchsorted(self._ways, graph.offsets))
+        self._targets = frozen(graph.targets[self._ways])
+        self._logs = frozen(np.log(graph.probabilities[self._ways]))
         # Of each frame the most probable next one; of frames outside the graph any.
         likeliest = np.zeros(len(graph.database), dtype=np.int32)
         # Of equally probable ones the first of the row, which is the recorded one, is written last.
         order = np.argsort(-graph.probabilities, kind="stable")[::-1]
         likeliest[graph.sources[order]] = graph.targets[order]
-        self._likeliest = _frozen(likeliest)
+        self._likeliest = frozen(likeliest)
         labels = clusters.labels
         own = clusters.log_probabilities[np.arange(len(labels)), labels]
-        self._belongs = _frozen(own.astype(np.float64))
+        self._belongs = frozen(own.astype(np.float64))
         order = np.argsort(labels, kind="stable")
-        self._sizes = _frozen(np.bincount(labels, minlength=len(clusters)).astype(np.int32))
+        self._sizes = frozen(np.bincount(labels, minlength=len(clusters)).astype(np.int32))
         begins = np.cumsum(self._sizes) - self._sizes
         ranks = np.empty(len(labels), dtype=np.int32)
         ranks[order] = np.arange(len(labels)) - begins[labels[order]]
-        self._ranks = _frozen(ranks)
+        self._ranks = frozen(ranks)
+        self._members = frozen(order.astype(np.int32))
+        # What it costs at least to enter one cluster from another.
+        leaps = np.full((len(clusters), len(clusters)), np.inf)
+        into, sources = self._targets, graph.sources[self._ways]
+        np.minimum.at(leaps, (labels[sources], labels[into]), -self._logs - self._belongs[into])
+        self._leaps = frozen(leaps)
+        # The same ways, in rows of those that lead to each frame.
+        back = np.argsort(into, kind="stable")
+        self._back_sources = frozen(sources[back])
+        self._back_offsets = frozen(np.searchsorted(into[back], np.arange(len(labels) + 1)))
 
     def branch(self, frame: int) -> IntArray:
         """Frames from one to the first with several ways on, whose tree it shares.
@@ -198,22 +204,37 @@ class ClusterForest:
             self.depth(time_bound_s), frames, parents, ways, steps, nodes, values, *made,
         )  # fmt: skip
         ways[1:count] = self._ways[ways[1:count]]
+        values.flags.writeable = False
+        for array in (frames, parents, ways, steps, nodes, *made):
+            array.flags.writeable = False
         return ClusterTree(
-            *(_frozen(v[:count].copy()) for v in (frames, parents, ways, steps, nodes, values)),
-            *(_frozen(v[:size].copy()) for v in made),
-        )
+            frames[:count], parents[:count], ways[:count], steps[:count], nodes[:count],
+            values[:count], *(array[:size] for array in made),
+        )  # fmt: skip
 
-    def places(self, tree: ClusterTree, nodes: npt.NDArray[np.integer]) -> FloatArray:
-        """(k, 4) planar states of the root where it enters nodes (k,), along the tree's own ways.
+    def places(
+        self,
+        tree: ClusterTree,
+        nodes: npt.NDArray[np.integer],
+        place: npt.ArrayLike = placement.IDENTITY,
+    ) -> FloatArray:
+        """Where the root enters nodes along the tree's own ways.
 
-        They are in the world of the clip of the tree's root.
+        Args:
+            tree: The tree.
+            nodes: (k,) of it.
+            place: (4,) where the clip of the tree's root is put.
+
+        Returns:
+            (k, 4) planar states.
         """
         from dynresp.locomotion.clusters.forest_kernel import place_kernel
 
-        visits = _frozen(tree.node_visits[nodes])
-        clips = np.empty((len(tree.frames), 4))
-        place_kernel(tree.parents, tree.ways, visits, self.graph.placements, clips)
-        return placement.compose(clips[visits], self.graph.database.planar[tree.frames[visits]])
+        database = self.graph.database
+        return place_kernel(
+            tree.frames, tree.parents, tree.ways, frozen(tree.node_visits[nodes]),
+            database.successors, self.graph.placements, database.planar, _row(place),
+        )  # fmt: skip
 
     def places_along(self, frames: IntArray, place: npt.ArrayLike) -> FloatArray:
         """(s, 4) planar states of the root along frames (s,).
@@ -221,15 +242,23 @@ class ClusterForest:
         Args:
             frames: Each follows the one before.
             place: (4,) where the clip of the first is put.
-        """
-        from dynresp.locomotion.clusters.forest_kernel import place_kernel
 
-        moves = self.graph.placement_between(frames[:-1], frames[1:])
-        before = _frozen(np.arange(-1, len(frames) - 1, dtype=np.int32))
-        clips = np.empty((len(frames), 4))
-        place_kernel(before, before, before[-1:] + 1, _frozen(moves), clips)
-        along = placement.compose(clips, self.graph.database.planar[frames])
-        return placement.compose(place, along)
+        Raises:
+            UsageError: No way of the graph leads from one to the next.
+        """
+        from dynresp.locomotion.clusters.forest_kernel import along_kernel
+
+        graph, along = self.graph, np.empty((len(frames), 4))
+        placed = along_kernel(
+            graph.offsets, graph.targets, graph.placements, graph.database.planar,
+            np.ascontiguousarray(frames, dtype=np.int32), _row(place), along,
+        )  # fmt: skip
+        if placed < len(frames):
+            raise UsageError(
+                f"frame {frames[placed]} does not follow frame {frames[placed - 1]} in the graph; "
+                "give frames of a walk through it"
+            )
+        return along
 
     def probable_motion(
         self, tree: ClusterTree, node: int, time_bound_s: float | None = None
@@ -244,10 +273,11 @@ class ClusterForest:
         Raises:
             UsageError: The tree itself enters the node later than that.
         """
-        from dynresp.locomotion.clusters.forest_kernel import probable_kernel
+        from dynresp.locomotion.clusters.probable_kernel import probable_kernel
 
         depth = self.depth(time_bound_s)
-        fewest = int(tree.steps[tree.node_visits[node]])
+        entered = tree.node_visits[node]
+        fewest = int(tree.steps[entered])
         if fewest > depth:
             fps = self.graph.database.fps
             raise UsageError(
@@ -255,8 +285,10 @@ class ClusterForest:
                 f"of {depth / fps:g} s; allow at least so long"
             )
         frames, log_probability = probable_kernel(
-            self._offsets, self._targets, self._logs, self._belongs, self.clusters.labels,
-            self._ranks, self._sizes, tree.cluster_path(node), tree.way_to(node), depth,
+            self._offsets, self._targets, self._logs, self._back_offsets, self._back_sources,
+            self._belongs, self.clusters.labels, self._ranks, self._sizes, self._members,
+            self._leaps, tree.cluster_path(node), tree.way_to(node),
+            tree.log_probabilities[entered], depth,
         )  # fmt: skip
         return ProbableMotion(frames, log_probability)
 
@@ -270,21 +302,21 @@ class ClusterForest:
         Returns:
             The frames, and those that follow.
         """
-        labels = self.clusters.labels
-        frame, cluster = int(frames[-1]), labels[frames[-1]]
-        more: list[int] = []
-        while len(frames) + len(more) <= most:
-            frame = int(self._likeliest[frame])
-            if labels[frame] != cluster:
-                break
-            more.append(frame)
-        return np.append(frames, np.array(more, dtype=np.int32))
+        from dynresp.locomotion.clusters.forest_kernel import stay_kernel
+
+        return stay_kernel(
+            self._likeliest, self.clusters.labels, np.ascontiguousarray(frames, np.int32), most
+        )
 
     def depth(self, time_bound_s: float | None) -> int:
         """Frames that fit into a time bound [s]."""
         bound = self.time_bound_s if time_bound_s is None else time_bound_s
         # A bound that is a number of frames but for rounding is that number.
         return int(bound * self.graph.database.fps + 1e-6)
+
+
+def _row(place: npt.ArrayLike) -> FloatArray:
+    return np.ascontiguousarray(place, dtype=np.float64)
 
 
 def _followed(graph: MotionGraph, clusters: Clusters) -> IntArray:
@@ -299,9 +331,4 @@ def _followed(graph: MotionGraph, clusters: Clusters) -> IntArray:
     recorded = graph.database.successors[graph.sources] == graph.targets
     followed = recorded.copy()
     followed[order] |= rank < _ALIKE
-    return _frozen(np.flatnonzero(followed).astype(np.int32))
-
-
-def _frozen(array: npt.NDArray) -> npt.NDArray:  # type: ignore[type-arg]
-    array.flags.writeable = False
-    return array
+    return frozen(np.flatnonzero(followed).astype(np.int32))

@@ -1,4 +1,4 @@
-"""The compiled part of the cluster forest: growing a tree, and the most probable motion.
+"""The compiled part of the cluster forest: growing a tree, and following its ways.
 
 Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
 is used. What is computed, and why so, is told in `forest`.
@@ -6,7 +6,6 @@ is used. What is computed, and why so, is told in `forest`.
 
 from __future__ import annotations
 
-import heapq
 import math
 from typing import Any
 
@@ -20,24 +19,28 @@ _PLAIN: dict[str, Any] = {"error_model": "numpy"}
 _OFFSETS = types.Array(types.int64, 1, "C", readonly=True)
 _INTS = types.Array(types.int32, 1, "C", readonly=True)
 _REALS = types.Array(types.float64, 1, "C", readonly=True)
+_TABLE = types.Array(types.float64, 2, "C", readonly=True)
 _INT = types.int64
 _OUT = types.int32[::1]
-_TABLE = types.Array(types.float64, 2, "C", readonly=True)
 # fmt: off
 _GROW = types.UniTuple(types.int64, 2)(
     _OFFSETS, _INTS, _REALS, _INTS, _INT, _INT, _OUT, _OUT, _OUT, _OUT, _OUT,
     types.float64[::1], _OUT, _OUT, _OUT)
-_PLACE = types.void(_INTS, _INTS, _INTS, _TABLE, types.float64[:, ::1])
-_PROBABLE = types.Tuple((types.int32[::1], types.float64))(
-    _OFFSETS, _INTS, _REALS, _REALS, _INTS, _INTS, _INTS, _INTS, _INTS, _INT)
+_PLACE = types.float64[:, ::1](_INTS, _INTS, _INTS, _INTS, _INTS, _TABLE, _TABLE, _REALS)
+_ALONG = types.int64(_OFFSETS, _INTS, _TABLE, _TABLE, _INTS, _REALS, types.float64[:, ::1])
+_BACK = types.int32[::1](_INTS, _INTS, _INT)
+_STAY = types.int32[::1](_INTS, _INTS, _INTS, _INT)
 # fmt: on
 
 
 @njit(inline="always")
-def _longer(array, room):  # type: ignore[no-untyped-def]
-    longer = np.empty(room, array.dtype)
-    longer[: len(array)] = array
-    return longer
+def _put(outer, inner, out):  # type: ignore[no-untyped-def]
+    """The placement `inner` followed by `outer`, (4,) each, as `placement.compose`."""
+    cosine, sine = math.cos(outer[3]), math.sin(outer[3])
+    out[0] = outer[0] + cosine * inner[0] - sine * inner[1]
+    out[1] = outer[1] + sine * inner[0] + cosine * inner[1]
+    out[2] = outer[2] + inner[2]
+    out[3] = math.pi - (math.pi - (outer[3] + inner[3])) % (2.0 * math.pi)
 
 
 @compiled(_GROW, **_PLAIN)
@@ -108,148 +111,114 @@ def grow_kernel(  # type: ignore[no-untyped-def]
 
 
 @compiled(_PLACE, **_PLAIN)
-def place_kernel(parents, ways, visits, placements, clips):  # type: ignore[no-untyped-def]
-    """Where the clips of visited frames are put, seen from the clip of the root.
+def place_kernel(frames, parents, ways, visits, successors, placements, planar, place):  # type: ignore[no-untyped-def]
+    """Where the root is at visited frames.
 
     Args:
+        frames: (v,) frame of each visit.
         parents: (v,) visit before each; -1 of the first.
         ways: (v,) by which each was reached.
         visits: (k,) those that are asked for.
+        successors: (n,) the recorded next frame of each, which is in the same clip.
         placements: (m, 4) of the ways.
-        clips: Out, (v, 4); the visits that are asked for and those on the way to them are written.
+        planar: (n, 4) states of the root at all frames, in the world of their clips.
+        place: (4,) where the clip of the first visit is put.
+
+    Returns:
+        (k, 4) planar states.
     """
-    needed = np.zeros(len(parents), np.bool_)
-    for visit in visits:
-        while visit >= 0 and not needed[visit]:
-            needed[visit] = True
+    # Of few visits the clip is needed: of those asked for, and of those on the way to them.
+    slots = np.full(len(parents), np.int32(-1))
+    clips = np.empty((len(parents), 4))
+    clips[0] = place
+    slots[0] = 0
+    waiting = np.empty(len(parents), np.int32)
+    count = 1
+    out = np.empty((len(visits), 4))
+    for k in range(len(visits)):
+        visit, depth = visits[k], 0
+        while slots[visit] < 0:
+            waiting[depth] = visit
+            depth += 1
             visit = parents[visit]
-    clips[0] = 0.0
-    for visit in range(1, len(parents)):
-        if not needed[visit]:
-            continue
-        before, way = clips[parents[visit]], ways[visit]
-        cosine, sine = math.cos(before[3]), math.sin(before[3])
-        x, y = placements[way, 0], placements[way, 1]
-        clips[visit, 0] = before[0] + cosine * x - sine * y
-        clips[visit, 1] = before[1] + sine * x + cosine * y
-        clips[visit, 2] = before[2] + placements[way, 2]
-        clips[visit, 3] = before[3] + placements[way, 3]
-
-
-@njit(**_PLAIN)
-def _best_first(  # type: ignore[no-untyped-def]
-    offsets, targets, logs, belongs, labels, ranks, sizes, root, path, depth, bounded, most
-):
-    """The most probable motion along a path; within the depth only where `bounded`.
-
-    Only motions that are better than `most`, a negative logarithm, are looked for.
-
-    Of all motions begun, the most probable goes on. One that comes to a place of the path and a
-    frame where a better one has been ends there, unless the depth counts and it took fewer steps.
-    The first one taken up in the last cluster is the best of all.
-    """
-    last = len(path) - 1
-    begins = np.zeros(last + 2, np.int64)
-    for k in range(last + 1):
-        begins[k + 1] = begins[k] + sizes[path[k]]
-    # At each place and frame, the steps of the best motion begun and of the last one taken up:
-    # motions of as many or more end there. Where the depth does not count, all do.
-    best = np.full(begins[last + 1], np.inf)
-    best_steps = np.zeros(begins[last + 1], np.int32)
-    fewest = np.full(begins[last + 1], np.int32(2**31 - 1))
-    room, count = 256, 1
-    frames, places = np.empty(room, np.int32), np.empty(room, np.int32)
-    parents, steps = np.empty(room, np.int32), np.empty(room, np.int32)
-    frames[0], places[0], parents[0], steps[0] = root, 0, -1, 0
-    heap = [(0.0, 0)]
-    whole, whole_cost = -1, most
-    while len(heap) > 0:
-        cost, own = heapq.heappop(heap)
-        frame, place = frames[own], places[own]
-        if place == last:
-            whole, whole_cost = own, cost
-            break
-        state = begins[place] + ranks[frame]
-        if steps[own] >= fewest[state]:
-            continue
-        fewest[state] = steps[own] if bounded else 0
-        for way in range(offsets[frame], offsets[frame + 1]):
-            at, target, place, reached = own, targets[way], places[own], cost - logs[way]
-            # Where there is only one way on, it is followed at once.
-            while True:
-                after = steps[at] + 1
-                if labels[target] != path[place]:
-                    place += 1
-                    if labels[target] != path[place]:
-                        break
-                reached -= belongs[target]
-                state = begins[place] + ranks[target]
-                if after >= fewest[state] or reached >= whole_cost or (bounded and after > depth):
-                    break
-                if reached < best[state]:
-                    best[state], best_steps[state] = reached, after if bounded else 0
-                elif after >= best_steps[state]:
-                    break
-                if count == room:
-                    room *= 2
-                    frames, places = _longer(frames, room), _longer(places, room)
-                    parents, steps = _longer(parents, room), _longer(steps, room)
-                frames[count], places[count] = target, place
-                parents[count], steps[count] = at, after
-                at = count
+        while depth > 0:
+            depth -= 1
+            after = waiting[depth]
+            slots[after] = slots[visit]
+            if successors[frames[visit]] != frames[after]:
+                _put(clips[slots[visit]], placements[ways[after]], clips[count])
+                slots[after] = count
                 count += 1
-                row = offsets[target]
-                if place == last or offsets[target + 1] - row > 1:
-                    heapq.heappush(heap, (reached, at))
-                    if place == last:
-                        whole_cost = reached
-                    break
-                target, reached = targets[row], reached - logs[row]
-    length = 0 if whole < 0 else steps[whole] + 1
-    motion = np.empty(length, np.int32)
-    for k in range(length - 1, -1, -1):
-        motion[k] = frames[whole]
-        whole = parents[whole]
-    return motion, -whole_cost
+            visit = after
+        _put(clips[slots[visit]], planar[frames[visit]], out[k])
+    return out
 
 
-@compiled(_PROBABLE, **_PLAIN)
-def probable_kernel(  # type: ignore[no-untyped-def]
-    offsets, targets, logs, belongs, labels, ranks, sizes, path, known, depth
-):
-    """The most probable motion along a cluster path.
+@compiled(_ALONG, **_PLAIN)
+def along_kernel(offsets, targets, placements, planar, frames, place, out):  # type: ignore[no-untyped-def]
+    """Where the root is along ways of the graph.
 
     Args:
         offsets: (n + 1,) rows of ways.
         targets: (m,) of the ways.
-        logs: (m,) logarithms of their probabilities.
-        belongs: (n,) log P(cluster of the frame | frame).
-        labels: (n,) cluster of each frame.
-        ranks: (n,) which of its cluster's frames each is.
-        sizes: (K,) frames of each cluster.
-        path: (p,) clusters, neighbours different; the first is the root's.
-        known: A motion along the path, the root first, of no more steps than the depth.
-        depth: Most steps.
+        placements: (m, 4) of the ways.
+        planar: (n, 4) states of the root at all frames, in the world of their clips.
+        frames: (s,) each follows the one before.
+        place: (4,) where the clip of the first is put.
+        out: Out, (s, 4) planar states.
 
     Returns:
-        Frames of the motion, the root first, up to the first in the path's last cluster, and the
-        logarithm of eq. 7.
+        How many frames were placed; fewer than all where no way leads to the next one.
     """
-    root = known[0]
-    # A motion that is the best of any length, and short enough, is found several times faster.
-    motion, value = _best_first(
-        offsets, targets, logs, belongs, labels, ranks, sizes, root, path, depth, False, np.inf
-    )
-    if len(motion) > depth + 1:
-        cost = 0.0
-        for k in range(1, len(known)):
-            way = offsets[known[k - 1]]
-            while targets[way] != known[k]:
+    clip, moved = place.copy(), np.empty(4)
+    for k in range(len(frames)):
+        if k > 0:
+            way, end = offsets[frames[k - 1]], offsets[frames[k - 1] + 1]
+            while way < end and targets[way] != frames[k]:
                 way += 1
-            cost -= logs[way] + belongs[known[k]]
-        # A little more, so that the known motion itself is found where there is none better.
-        most = cost + 1e-9
-        motion, value = _best_first(
-            offsets, targets, logs, belongs, labels, ranks, sizes, root, path, depth, True, most
-        )
-    return motion, value
+            if way == end:
+                return k
+            _put(clip, placements[way], moved)
+            clip[:] = moved
+        _put(clip, planar[frames[k]], out[k])
+    return len(frames)
+
+
+@compiled(_BACK, **_PLAIN)
+def back_kernel(values, parents, last):  # type: ignore[no-untyped-def]
+    """Values (s,) from a root to one of its descendants.
+
+    Args:
+        values: (v,) of each element.
+        parents: (v,) of each element; -1 of the root.
+        last: The element.
+    """
+    count, own = 0, last
+    while own >= 0:
+        count += 1
+        own = parents[own]
+    out, own = np.empty(count, np.int32), last
+    for k in range(count - 1, -1, -1):
+        out[k] = values[own]
+        own = parents[own]
+    return out
+
+
+@compiled(_STAY, **_PLAIN)
+def stay_kernel(likeliest, labels, frames, most):  # type: ignore[no-untyped-def]
+    """Frames (s,), and those by which it goes on while the cluster remains.
+
+    Args:
+        likeliest: (n,) the most probable next frame of each.
+        labels: (n,) cluster of each frame.
+        frames: (s,) at least one.
+        most: Most steps from the first frame to the last.
+    """
+    count = len(frames)
+    out = np.empty(max(most + 1, count), np.int32)
+    out[:count] = frames
+    cluster = labels[out[count - 1]]
+    while count <= most and labels[likeliest[out[count - 1]]] == cluster:
+        out[count] = likeliest[out[count - 1]]
+        count += 1
+    return out[:count]

@@ -8,6 +8,7 @@ as well; `Clusters.bounded` says whether the bound decided. All frames are then 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -15,16 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.clusters.mixture import (
-    CurvePoint,
-    IntArray,
-    Mixture,
-    MixtureConfig,
-    fit_mixture,
-)
+from dynresp.locomotion.clusters.mixture import CurvePoint, Mixture, MixtureConfig, fit_mixture
 from dynresp.locomotion.clusters.observations import decorrelation, observations
 from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
+from dynresp.motion.rotations import FloatArray
 
 
 @dataclass(frozen=True)
@@ -134,6 +131,14 @@ class Clusters:
     def __len__(self) -> int:
         """Number of clusters."""
         return len(self.examples)
+
+    @functools.cached_property
+    def apart(self) -> FloatArray:
+        """(K, K) squared distances of the clusters' means."""
+        means = self.mixture.means
+        squared: FloatArray = np.sum((means[:, None] - means) ** 2, axis=2)
+        squared.flags.writeable = False
+        return squared
 
 
 def _with_frames(

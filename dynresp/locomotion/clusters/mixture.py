@@ -21,9 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import MotionError, UsageError
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.rotations import FloatArray
-
-IntArray = npt.NDArray[np.int32]
 
 # When EM stops: at which gain in log-likelihood for one observation, or after how many steps.
 # While growing that may be early; the mixture that is kept runs to the end.

@@ -64,7 +64,7 @@ def observations(
     if coordinates is Coordinates.RELATIVE:
         speeds[:, 2] = database.planar[:, 2]
     # The leaning is free of any twist about the vertical: its third number is 0.
-    return _averaged(database, np.hstack([speeds, leaning[:, :2], angles]))
+    return averaged(database, np.hstack([speeds, leaning[:, :2], angles]))
 
 
 def reference_orientation(quaternions: FloatArray) -> FloatArray:
@@ -122,7 +122,7 @@ def _speeds(database: MotionDatabase) -> FloatArray:
     return out
 
 
-def _averaged(database: MotionDatabase, x: FloatArray) -> FloatArray:
+def averaged(database: MotionDatabase, x: FloatArray) -> FloatArray:
     """Means of (n, d) over a walk's cycle around each frame, cut at the ends of its clip."""
     half = round(0.5 * WALK_CYCLE_S * database.fps)
     out = np.empty_like(x)

@@ -8,20 +8,19 @@ import numpy as np
 import pytest
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.choice.actions import Choice, choices
+from dynresp.locomotion.choice.actions import OfferedAction, choices
 from dynresp.locomotion.choice.control import ChoiceControl
 from dynresp.locomotion.choice.window import Box, ChoiceWindow, Disc
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.clusters.grouping import Clusters
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.config import Coordinates
 from dynresp.locomotion.graph.walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.load import LoadOptions, load_motion
 from tests.locomotion.clusters.forest_samples import random_forest
-from tests.locomotion.samples import walking_graph
+from tests.locomotion.samples import planned_graph, walking_graph
+from tests.oracles import choice as slow
 
 PLACE = np.array([3.0, -2.0, 0.0, 1.2])
 
@@ -43,12 +42,12 @@ def moments(forest: ClusterForest, count: int) -> list[int]:
     return [int(frame) for frame in walk[::7]]
 
 
-def end_of(choice: Choice) -> tuple[float, ...]:
+def end_of(choice: OfferedAction) -> tuple[float, ...]:
     x, y, _, yaw = choice.path[-1]
     return (x, y, np.cos(yaw), np.sin(yaw), 10.0 * choice.cluster)
 
 
-def check(forest: ClusterForest, frame: int, offered: tuple[Choice, ...]) -> None:
+def check(forest: ClusterForest, frame: int, offered: tuple[OfferedAction, ...]) -> None:
     """What every set of choices keeps to."""
     graph, clusters = forest.graph, forest.clusters
     ways = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
@@ -73,6 +72,31 @@ def test_choices_are_different_and_can_be_walked(made: ClusterForest) -> None:
         counts.append(len(offered))
     assert min(counts) >= 3
     assert max(counts) == 4
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("kind", ["usual", "soon", "here"])
+def test_choices_are_the_slow_ones(kind: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    coordinates = list(Coordinates)[seed % 3]
+    forest = random_forest(
+        rng, lengths=(25,) * 3, jumps=int(rng.integers(2, 30)), clusters=6, coordinates=coordinates
+    )
+    for frame in rng.choice(forest.graph.frames, 4).tolist():
+        planar = forest.graph.database.planar[frame]
+        x, y = placement.compose(PLACE, planar)[:2]
+        window = {
+            "usual": ChoiceWindow(),
+            "soon": ChoiceWindow(wanted=6, least_s=0.5, most_s=2.5),
+            "here": ChoiceWindow(area=Disc(x, y, 1.0)),
+        }[kind]
+        offered = choices(forest, frame, PLACE, window)
+        expected = slow.choices(forest, frame, PLACE, window)
+        assert [[frame, *c.frames.tolist()] for c in offered] == [frames for frames, _ in expected]
+        for choice, (_, states) in zip(offered, expected, strict=True):
+            np.testing.assert_allclose(choice.path[:, :3], states[:, :3], atol=1e-9)
+            turned = placement.wrapped(choice.path[:, 3] - states[:, 3])
+            np.testing.assert_allclose(turned, 0.0, atol=1e-9)
 
 
 def test_as_many_as_wanted_are_offered(made: ClusterForest) -> None:
@@ -200,24 +224,37 @@ def test_a_choice_offered_elsewhere_is_refused(made: ClusterForest) -> None:
         control.advance(0)
 
 
+def time_of(forest: ClusterForest, frame: int) -> float:
+    """Processor time of this thread for one set of choices [s]."""
+    began = time.thread_time()
+    choices(forest, frame)
+    return time.thread_time() - began
+
+
 @pytest.mark.mocap
 @pytest.mark.slow
-def test_three_at_ten_thousand_moments_of_a_playground(
-    motions_folder: Path, character: Character
+@pytest.mark.parametrize("plan", ["walking", "playground"])
+def test_three_at_ten_thousand_moments_in_5_ms(
+    plan: str, motions_folder: Path, character: Character
 ) -> None:
-    files = sorted((motions_folder / "cmu" / "01").glob("*.amc"))
-    motions = [load_motion(file, options=LoadOptions(flat_floor=False)) for file in files]
-    config = GraphConfig(coordinates=Coordinates.FIXED, contact_change=False)
-    graph = MotionGraph.build(motions, config, character)
+    graph = planned_graph(plan, motions_folder, character)
     forest = ClusterForest(graph, Clusters.of(graph))
     choices(forest, int(graph.frames[0]))
     walk = random_walk(graph, 10_000, np.random.default_rng(1))
-    fewest, took = 99, []
-    for frame in walk.tolist():
-        began = time.perf_counter()
+    fewest, took = 99, np.empty(len(walk))
+    for k, frame in enumerate(walk.tolist()):
+        began = time.thread_time()
         offered = choices(forest, frame)
-        took.append(time.perf_counter() - began)
+        took[k] = time.thread_time() - began
         fewest = min(fewest, len({end_of(choice) for choice in offered}))
+    # What else runs on the machine slows this thread down as well, though never each time.
+    slow_ones = np.flatnonzero(took > 0.004)
+    for k in slow_ones.tolist():
+        took[k] = min(took[k], *(time_of(forest, int(walk[k])) for _ in range(5)))
+    print(
+        f"{plan}: {len(graph.frames)} frames, fewest options {fewest}, {len(slow_ones)} moments "
+        f"taken again; median {1e3 * np.median(took):.2f} ms, "
+        f"99.9 % under {1e3 * np.percentile(took, 99.9):.2f}, slowest {1e3 * took.max():.2f}"
+    )
     assert fewest >= 3
-    # On a quiet machine all are; others may be at work on this one.
-    assert np.median(took) < 0.005
+    assert took.max() < 0.005

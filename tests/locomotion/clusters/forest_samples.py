@@ -34,7 +34,7 @@ def random_forest(
     for source in [*ends, *rng.choice(n, jumps)]:
         ways.add((int(source), int(rng.choice(inner))))
     recorded = np.array([database.successors[i] == j for i, j in sorted(ways)])
-    order = np.lexsort((~recorded, [i for i, _ in sorted(ways)]))
+    order = np.lexsort((~recorded, np.array([i for i, _ in sorted(ways)])))
     sources, targets = np.array(sorted(ways))[order].T
     distances = np.where(recorded[order], 0.0, rng.uniform(0.01, 0.2, len(ways)))
     offsets = np.concatenate([[0], np.cumsum(np.bincount(sources, minlength=n))])
