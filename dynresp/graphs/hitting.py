@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from dynresp.experiments.choosing import take_chooser
 from dynresp.experiments.spec import ChoiceTable
-from dynresp.graphs.outing import Outing
+from dynresp.graphs.outing import Outing, skate
 from dynresp.locomotion.avatar.avatar import Avatar, Doing, Wanderer
 from dynresp.locomotion.avatar.crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -21,14 +22,10 @@ from dynresp.motion.library import default_library
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball
-from dynresp.response.dynamic import Event as Happening
-from dynresp.response.dynamic import EventKind, Flight
-from dynresp.response.dynamic import Phase as Driven
+from dynresp.progress import Progress
+from dynresp.response.dynamic import Event, EventKind, Flight, Phase
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.view.story import Event, MovingSphere, Phase, PhaseName
-
-Progress = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many."""
+from dynresp.view.story import MovingSphere, PhaseName, StoryEvent, StoryPhase
 
 # Balls: mass [kg], speed [m/s], height [m]; and from the launch of one to that of the next [s].
 _MASS, _SPEED, _HEIGHT = (3.0, 8.0), (5.0, 13.0), (0.5, 1.6)
@@ -84,8 +81,7 @@ def hit_outing(
             due = frame + round(rng.uniform(*_BETWEEN_S) * fps)
         crowd.advance()
         watcher.look()
-    poses = np.array(watcher.poses)
-    contacts = foot_contacts(character, character.kinematics(poses), fps)
+    motion = watcher.motion(character)
     returns = [  # of the last hundred those that are within the motion
         {
             "after": back.after,
@@ -101,12 +97,17 @@ def hit_outing(
         title="A walk with balls thrown at it",
         subtitle=f"{hits} hits in {seconds:.0f} s, reactions of the library {library.name!r}, "
         f"seed {seed}",
-        motion=Motion(poses, fps, "walking by graph, and hit", contacts),
+        motion=motion,
         jumps_s=None,
         spheres=watcher.spheres(),
         events=[event for event in watcher.events if event.time_s <= (frames - 1) / fps],
         phases=watcher.phases(),
-        about={"seed": seed, "choice": choosing.about, "returns": returns},
+        about={
+            "seed": seed,
+            "choice": choosing.about,
+            "returns": returns,
+            "foot_skate_by_part_m": watcher.skates(motion, character),
+        },
     )
 
 
@@ -125,12 +126,14 @@ class _Watcher:
 
     def __init__(self, avatar: Avatar) -> None:
         self.poses: list[FloatArray] = []
-        self.events: list[Event] = []
+        self.events: list[StoryEvent] = []
         self._avatar, self._responder = avatar, avatar.responder
         self._fps = avatar.responder.physics.fps
         self._driven: list[PhaseName] = []
+        self._parts: list[str] = []
+        self._standing: list[npt.NDArray[np.bool_] | None] = []
         self._flights: list[Flight] = []
-        self._last: Happening | None = None
+        self._last: Event | None = None
 
     def look(self) -> None:
         """Note the frame that is shown now."""
@@ -141,18 +144,46 @@ class _Watcher:
             self._last = event
             if event.kind in _NAMES:
                 # The first frame that is shown is frame 1 of the clock.
-                self.events.append(Event(_NAMES[event.kind], max(event.frame - 1, 0) / self._fps))
+                self.events.append(
+                    StoryEvent(_NAMES[event.kind], max(event.frame - 1, 0) / self._fps)
+                )
         flight = responder.flight
         if flight is not None and (not self._flights or self._flights[-1] is not flight):
             self._flights.append(flight)
         self._driven.append(self._name_of_phase())
+        standing = self._avatar.standing
+        self._standing.append(standing)
+        self._parts.append("graph" if standing is not None else responder.phase.value)
 
-    def phases(self) -> list[Phase]:
+    def motion(self, character: Character) -> Motion:
+        """What was shown; on its way through the graph with the graph's foot contacts."""
+        poses = np.array(self.poses)
+        contacts = foot_contacts(character, character.kinematics(poses), self._fps)
+        for k, standing in enumerate(self._standing):
+            if standing is not None:
+                contacts[k] = standing
+        return Motion(poses, self._fps, "walking by graph, and hit", contacts)
+
+    def skates(self, motion: Motion, character: Character) -> dict[str, dict[str, float] | None]:
+        """How far feet slide in stances, or what of them lies in a part of the motion [m].
+
+        The parts are the way through the graph ("graph"), and what else moved the avatar
+        (`dynresp.response.dynamic.Phase`), of which "playing" is a reaction after its blend.
+        """
+        parts = np.array(self._parts)
+        return {
+            part: skate(
+                replace(motion, contacts=motion.contacts & (parts == part)[:, None]), character
+            )
+            for part in dict.fromkeys(self._parts)
+        }
+
+    def phases(self) -> list[StoryPhase]:
         """What drove the avatar when."""
         edges = [k for k in range(1, len(self._driven)) if self._driven[k] != self._driven[k - 1]]
         bounds = [0, *edges, len(self._driven)]
         return [
-            Phase(self._driven[a], a / self._fps, b / self._fps)
+            StoryPhase(self._driven[a], a / self._fps, b / self._fps)
             for a, b in itertools.pairwise(bounds)
         ]
 
@@ -172,11 +203,11 @@ class _Watcher:
 
     def _name_of_phase(self) -> PhaseName:
         driven = self._responder.phase
-        if driven is Driven.PHYSICS:
+        if driven is Phase.PHYSICS:
             return "physics"
-        if driven is Driven.BLEND:
+        if driven is Phase.BLEND:
             return "blend"
-        if driven is Driven.PLAYING and self._avatar.doing is not Doing.WALKING:
+        if driven is Phase.PLAYING and self._avatar.doing is not Doing.WALKING:
             return "reaction"
         last = self._avatar.returns[-1] if self._avatar.returns else None
         if last is not None and last.moment is not None and last.after != CARRY_ON:

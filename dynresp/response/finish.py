@@ -15,6 +15,7 @@ from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
+from dynresp.motion.skating import foot_slides
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Trace
 from dynresp.response.choice import Choice
@@ -31,6 +32,8 @@ Flags: TypeAlias = npt.NDArray[np.bool_]
 # Sine of the angle to the ground from which on the line from ankle to hip is that of a leg to stand
 # on.
 _STEEP = 0.5
+# A foot whose stillest point goes faster is dragged on purpose: it is not held still [m/s].
+_DRAGGED = 0.25
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,8 @@ def _fitted(
     """
     length = len(simulated) - 1
     config = FitConfig()
-    contacts = _stances(*(_standing(character, x, fps) for x in (simulated, placed, poses)))
+    before, entered, blended = (_standing(character, x, fps) for x in (simulated, placed, poses))
+    contacts = _stances(before, entered, blended, entered & ~_dragged(character, placed, fps))
     if going_on:
         contacts[-config.fading(fps) :] = False
     source = np.concatenate([simulated[:1], placed[1:]])
@@ -151,13 +155,14 @@ def _fitted(
     return raise_above(character, fit_feet(character, composed, config), fps)
 
 
-def _stances(before: Flags, entered: Flags, blended: Flags) -> Flags:
+def _stances(before: Flags, entered: Flags, blended: Flags, still: Flags) -> Flags:
     """When feet are to stand from the exit on (frames, 2).
 
     Args:
         before: Whether they stand in the simulation, from the exit to the blend's end.
         entered: Whether they stand in the motion entered.
         blended: Whether they stand in the blend of the two, and then in the motion entered.
+        still: Whether they stand in the motion entered and are not dragged.
     """
     entered, blended = entered.copy(), blended.copy()
     entered[0] = blended[0] = before[0]
@@ -166,10 +171,19 @@ def _stances(before: Flags, entered: Flags, blended: Flags) -> Flags:
     # simulation still has it in the air.
     goes_on = np.logical_and.accumulate(entered) | np.logical_and.accumulate(blended)
     stances: Flags = goes_on | (entered & blended)
-    # Those that begin after the blend are the recording's.
+    # After the blend those that go on do so to their end. The recording's own are held as well:
+    # else a correction that fades would drag them.
     length = len(before) - 1
-    stances[length:] &= np.logical_and.accumulate(stances[length:])
+    stances[length:] = np.logical_and.accumulate(stances[length:]) | still[length:]
     return stances
+
+
+def _dragged(character: Character, poses: FloatArray, fps: float) -> Flags:
+    """Which feet slide faster over the ground than any that is to stand (frames, 2)."""
+    slides = foot_slides(character, character.kinematics(poses)) * fps > _DRAGGED
+    beside = np.zeros((1, len(FEET)), dtype=bool)
+    dragged: Flags = np.concatenate([slides, beside]) | np.concatenate([beside, slides])
+    return dragged
 
 
 def _standing(character: Character, poses: FloatArray, fps: float) -> Flags:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from dynresp.errors import MotionError, UnknownNameError
 from dynresp.motion import rotations
+from dynresp.motion.arrays import frozen
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.window_config import WindowErrorConfig
 
@@ -126,7 +127,7 @@ class LibraryWindows:
             names=tuple(names),
             windows=tuple(self.windows[row] for row in rows),
             buffer=self.buffer,
-            offsets=_read_only(self.offsets[rows]),
+            offsets=frozen(self.offsets[rows]),
             config=self.config,
         )
 
@@ -224,8 +225,8 @@ def make_many_windows(
     padding = -len(first) % LANES
     states = np.concatenate([states, np.repeat(states[:, -1:], padding, axis=1)], axis=1)
     data = np.ascontiguousarray(states.transpose(0, 2, 3, 4, 1), dtype=np.float32)
-    _read_only(data)
-    starts_alike = _read_only(first)
+    frozen(data)
+    starts_alike = frozen(first)
     return [WindowSet(data=own, starts=starts_alike, config=config) for own in data]
 
 
@@ -281,13 +282,13 @@ def library_windows(tracks: Sequence[ReactionTrack], config: WindowErrorConfig) 
     ends = np.cumsum([windows.data.size for windows in made])
     buffer = _aligned(int(ends[-1]))
     np.concatenate([windows.data.ravel() for windows in made], out=buffer)
-    _read_only(buffer)
+    frozen(buffer)
     views = [
         WindowSet(buffer[end - w.data.size : end].reshape(w.data.shape), w.starts, config)
         for w, end in zip(made, ends, strict=True)
     ]
     offsets = np.array([0, *ends[:-1]], dtype=np.int64)
-    return LibraryWindows(names, tuple(views), buffer, _read_only(offsets), config)
+    return LibraryWindows(names, tuple(views), buffer, frozen(offsets), config)
 
 
 def _aligned(size: int) -> npt.NDArray[np.float32]:
@@ -347,9 +348,3 @@ def _checked_tracks(
             f"{norms[track, frame, body]:.4g}; expected unit length, w x y z."
         )
     return position, quaternion / norms[..., None]
-
-
-def _read_only(array: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
-    """Close an array to writing, since it is shared."""
-    array.flags.writeable = False
-    return array

@@ -68,6 +68,24 @@ class TestStandingFeet:
         assert np.linalg.norm(way, axis=1).max() < 0.06
         assert _ankles(character, end.poses)[-1, 0, 2] == pytest.approx(0.07, abs=0.01)
 
+    def test_steps_after_the_blend_do_not_slide_while_a_correction_fades(
+        self, character: Character
+    ) -> None:
+        """The left foot stands apart, and is put down beside the other soon after the blend."""
+        simulated = _crouching(character, 1.0).poses[: LENGTH + 1]
+        entered = _crouching(character, 4.0, 0.25)
+        ankles = _ankles(character, entered.poses)
+        at = np.clip((np.arange(len(ankles)) - 5 - LENGTH - 6) / 4.0, 0.0, 1.0)
+        ankles[:, 0, 0] -= 0.2 * at
+        ankles[:, 0, 2] += 0.1 * np.sin(np.pi * at)
+        stepping = Motion(legs.place_ankles(character, entered.poses, ankles), FPS, "stepping")
+        for name in ("stepping", CARRY_ON):
+            end = _ended(character, simulated, stepping, name)
+            way = np.diff(_ankles(character, end.poses)[:, 0, :2], axis=0)
+            # From where it stands again until it is let go, where it carries on.
+            after = np.linalg.norm(way, axis=1)[LENGTH + 17 : LENGTH + 36]
+            assert after.max() < 1e-3
+
     def test_one_who_lies_has_no_standing_feet(self, character: Character) -> None:
         """Legs that lie on the ground are blended as before."""
         poses = standing(character, 3.0).poses.copy()

@@ -19,10 +19,10 @@ import numpy.typing as npt
 from dynresp.errors import UsageError
 from dynresp.locomotion.avatar.reentry import ReentryPlanner, WayBack
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.walk import random_walk
 from dynresp.locomotion.playing.stream import Stream
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import Motion, pose_velocities
@@ -169,6 +169,16 @@ class Avatar:
             self._graph.database.contacts[start : start + 1, :2],
         )
 
+    @property
+    def standing(self) -> npt.NDArray[np.bool_] | None:
+        """(2,) which feet are to stand in the frame that is shown.
+
+        None while it does not show its way through the graph: while something approaches it is
+        simulated already, if held by the pelvis, and a reaction stands as it does.
+        """
+        shown = self.doing is Doing.WALKING and self.responder.phase is Phase.PLAYING
+        return self._stream.standing(self.responder.frame) if shown and self._stream else None
+
     def keep_on(self) -> None:
         """Plan what is needed before the responder's next frame."""
         responder = self.responder
@@ -187,7 +197,8 @@ class Avatar:
         """Go where another planner says, as soon as possible: from the graph's next frame on.
 
         Args:
-            planner: What says where it goes from now on. While it is hit, from its return on.
+            planner: What says where it goes from now on. While it is hit, from when the reaction
+                is blended away (`GraphConfig.blend_s` after its return) on.
         """
         self.planner = planner
         free = self.responder.free_from
@@ -250,9 +261,24 @@ class Avatar:
             way.frame, begin, poses[before], velocities[row], contacts[before]
         )
         self.doing = Doing.WALKING
-        if len(way.detour):
-            self._stream.extend(way.detour)
+        before_choice = way.detour if len(way.detour) else self._recorded(way.frame)
+        if len(before_choice):
+            self._stream.extend(before_choice)
         self._feed(self._stream, at_once=True)
+
+    def _recorded(self, frame: int) -> IntArray:
+        """What was recorded after a frame of the graph, for as long as a blend lasts (k,).
+
+        A jump while the reaction is blended away would drag feet that stand farther than any of the
+        graph's own.
+        """
+        graph, path = self._graph, [frame]
+        for _ in range(round(graph.config.blend_s * graph.database.fps)):
+            following = int(graph.database.successors[path[-1]])
+            if graph.targets[graph.offsets[path[-1]]] != following:
+                break
+            path.append(following)
+        return np.array(path[1:], dtype=np.int32)
 
     def _stream_from(
         self,

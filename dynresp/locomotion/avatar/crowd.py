@@ -83,7 +83,7 @@ class AvatarCrowd:
             for f, place in starts
         ]
         self.crowd = Crowd(character, library, bases, settings, chooser, threads)
-        reentry = reentry or ReentryPlanner(graph)
+        reentry = reentry or ReentryPlanner(graph, character)
         self.avatars = tuple(
             Avatar(character, responder, planner, reentry, frame, config or AvatarConfig())
             for responder, planner, (frame, _) in zip(

@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from dynresp.errors import MotionError
 from dynresp.locomotion.graph.config import Coordinates
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.distance import (
     JOINT_WEIGHTS,
     FrameFeatures,
@@ -21,6 +20,7 @@ from dynresp.locomotion.graph.distance import (
     frame_features,
 )
 from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.rotations import FloatArray
 
 # Bits of the feet in a contact state.
@@ -42,7 +42,7 @@ class Nearest:
     """What of a graph resembles each of some poses most.
 
     Attributes:
-        frames: (m,) of the graph's database.
+        frames: (m,) of the graph's database; of `EntryIndex.several` (m, count), as the others.
         distances: (m,) how unlike they are (eq. 2).
         same_contacts: (m,) whether the same feet stand.
     """
@@ -110,9 +110,7 @@ class EntryIndex:
             farthest: What is not nearer than this is not near enough; and where nothing is, it need
                 not be the nearest that is told.
         """
-        features = frame_features(poses, velocities, self.graph.config)
-        sketch = self._sketched(_rows(features) - self._center)
-        standing = np.asarray(contacts, dtype=np.uint8) @ np.array([1, 2], dtype=np.uint8)
+        features, sketch, standing = self._laid_out(poses, velocities, contacts)
         places, distances = np.zeros(len(sketch), np.intp), np.full(len(sketch), np.inf)
 
         def look_up(rows: npt.NDArray[np.intp], state: int) -> None:
@@ -127,6 +125,64 @@ class EntryIndex:
         look_up(np.flatnonzero(~same), _FEET + 1)
         return Nearest(self.frames[places], distances, same)
 
+    def several(
+        self,
+        poses: FloatArray,
+        velocities: FloatArray,
+        contacts: npt.NDArray[np.bool_],
+        count: int,
+        farthest: float = np.inf,
+    ) -> Nearest:
+        """Some frames that resemble each pose: the nearest, and others that hardly do less.
+
+        The others are those whose sketches are nearest, which need not be the next in order.
+
+        Args:
+            poses: (m, 59).
+            velocities: (m, 45) rows of `qvel`.
+            contacts: (m, 2) whether the left and the right foot stand.
+            count: How many for each, 1 or more; where there are fewer, the nearest is repeated.
+            farthest: See `nearest`.
+
+        Returns:
+            (m, count) each; the nearest is the first.
+        """
+        best = self.nearest(poses, velocities, contacts, farthest)
+        features, sketch, standing = self._laid_out(poses, velocities, contacts)
+        standing = np.where(best.same_contacts, standing, _FEET + 1)
+        frames = np.repeat(best.frames[:, None], count, axis=1)
+        distances = np.repeat(best.distances[:, None], count, axis=1)
+        for state in range(_FEET + 2):
+            least = min(count, len(self._places[state]) + 1) - 1
+            rows = np.flatnonzero(standing == state)
+            if not len(rows) or not least:
+                continue
+            for block in np.array_split(rows, -(-len(rows) // _BLOCK)):
+                bounds = self._bounds(sketch[block], state)
+                columns = np.argpartition(bounds, least - 1, axis=1)[:, :least]
+                others = self._places[state][columns]
+                frames[block, 1 : least + 1] = self.frames[others]
+                distances[block, 1 : least + 1] = self._distances(
+                    features, np.repeat(block, least), others.ravel()
+                ).reshape(others.shape)
+        return Nearest(frames, distances, np.repeat(best.same_contacts[:, None], count, axis=1))
+
+    def _laid_out(
+        self, poses: FloatArray, velocities: FloatArray, contacts: npt.NDArray[np.bool_]
+    ) -> tuple[FrameFeatures, npt.NDArray[np.float32], npt.NDArray[np.intp]]:
+        """Poses as they are compared: in full, as sketches, and which feet stand (bits)."""
+        features = frame_features(poses, velocities, self.graph.config)
+        sketch = self._sketched(_rows(features) - self._center)
+        return features, sketch, np.asarray(contacts, dtype=np.intp) @ np.array([1, 2])
+
+    def _bounds(self, own: npt.NDArray[np.float32], state: int) -> npt.NDArray[np.float32]:
+        """No more than the squared distances between some sketches and a state's (rows, k)."""
+        others = self._sketches[state]
+        least = np.sum(others**2, axis=0) - 2.0 * (own @ others)
+        least += (np.sum(own**2, axis=1) - np.float32(_SLACK))[:, None]
+        bounds: npt.NDArray[np.float32] = least
+        return bounds
+
     def _look_up(
         self,
         features: FrameFeatures,
@@ -136,9 +192,7 @@ class EntryIndex:
         farthest: float,
     ) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """Place and distance of what is nearest to some poses, of the frames of a state."""
-        own, others = sketch[rows], self._sketches[state]
-        least = np.sum(others**2, axis=0) - 2.0 * (own @ others)
-        least += (np.sum(own**2, axis=1) - np.float32(_SLACK))[:, None]
+        least = self._bounds(sketch[rows], state)
         first = least.argmin(axis=1)
         bound = self._distances(features, rows, self._places[state][first])
         close = least <= np.minimum(bound, farthest)[:, None]

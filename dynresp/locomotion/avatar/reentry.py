@@ -10,8 +10,11 @@ import numpy.typing as npt
 
 from dynresp.errors import UsageError
 from dynresp.locomotion.avatar.entry_index import EntryIndex, Nearest
-from dynresp.locomotion.graph.database import IntArray
-from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.motion_graph import MotionGraph, between
+from dynresp.motion import legs, rotations
+from dynresp.motion.arrays import IntArray
+from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 
 
@@ -25,22 +28,31 @@ class ReentryConfig:
         farthest_lying: Largest distance to a frame from which a recorded way leads back there.
         waiting: What a second of waiting costs, as a distance [1/s].
         other_feet: What it costs, as a distance, if other feet stand.
+        apart: What it costs, as a distance, how far a foot is from where it is in the frame entered
+            [1/m]. One that stands is held there while the body goes on, until the leg is too short
+            and it slides; one that swings is put down too far away. The distance alone hardly
+            tells: somebody with one foot ahead by 0.3 m is near to one who has the other ahead.
+        candidates: So many frames are considered for each moment.
     """
 
     farthest: float = 1.2
     farthest_lying: float = 1.7
     waiting: float = 0.02
     other_feet: float = 0.3
+    apart: float = 1.0
+    candidates: int = 32
 
     def __post_init__(self) -> None:
         """Check the numbers.
 
         Raises:
-            UsageError: One is negative or not finite.
+            UsageError: One is negative or not finite, or there is no candidate.
         """
-        for name in ("farthest", "farthest_lying", "waiting", "other_feet"):
+        for name in ("farthest", "farthest_lying", "waiting", "other_feet", "apart"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise UsageError(f"{name} must be at least 0, got {getattr(self, name)}")
+        if self.candidates < 1:
+            raise UsageError(f"candidates must be at least 1, got {self.candidates}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +89,21 @@ class ReentryPlanner:
         entries: The frames of the component that may be entered.
     """
 
-    def __init__(self, graph: MotionGraph, config: ReentryConfig | None = None) -> None:
+    def __init__(
+        self, graph: MotionGraph, character: Character, config: ReentryConfig | None = None
+    ) -> None:
         """Lay out the graph's frames.
+
+        Args:
+            graph: The graph.
+            character: Whose body it is, for where its feet stand.
+            config: Settings.
 
         Raises:
             MotionError: No frame of the graph is followed by the one recorded after it.
         """
         self.graph = graph
+        self._character = character
         self.config = config or ReentryConfig()
         frames, successors = graph.frames, graph.database.successors
         recorded = graph.targets[graph.offsets[frames]] == successors[frames]
@@ -118,10 +138,15 @@ class ReentryPlanner:
         far = np.flatnonzero(seen.distances > config.farthest)
         first = int(far[-1]) + 1 if len(far) else 0
         if first < len(poses):
-            costs = seen.distances + config.waiting * times
-            costs += np.where(seen.same_contacts, 0.0, config.other_feet)
-            moment = first + int(np.argmin(costs[first:]))
-            return self._way(seen, moment, moment, np.zeros(0, np.int32))
+            late = slice(first, len(poses))
+            near = self.entries.several(
+                poses[late], velocities[late], contacts[late], config.candidates, config.farthest
+            )
+            costs = near.distances + config.waiting * times[late, None]
+            costs += np.where(near.same_contacts, 0.0, config.other_feet)
+            costs += config.apart * self._apart(poses[late], near.frames)
+            row, column = np.unravel_index(np.argmin(costs), costs.shape)
+            return self._way(near, (row, column), first + int(row), np.zeros(0, np.int32))
         if self._ups is None:
             return None
         last = self._ups.nearest(poses[-1:], velocities[-1:], contacts[-1:], config.farthest_lying)
@@ -133,9 +158,32 @@ class ReentryPlanner:
         detour[-1] = self._enter[frame]
         return self._way(last, 0, len(poses) - 1, detour)
 
+    def _apart(self, poses: FloatArray, frames: IntArray) -> FloatArray:
+        """How far the farther foot is, seen from above, from where it is in a frame (m, k) [m].
+
+        Args:
+            poses: (m, 59).
+            frames: (m, k) frames that could be entered, which are laid over the poses.
+        """
+        database, shape = self.graph.database, frames.shape
+        which, used = np.unique(frames, return_inverse=True)
+        ankles = legs.ankle_positions(
+            self._character, self._character.kinematics(database.poses[which])
+        )[used.reshape(shape)]
+        own = legs.ankle_positions(self._character, self._character.kinematics(poses))[:, None]
+        rows = np.repeat(np.arange(len(poses)), shape[1])
+        places = between(
+            placement.of_poses(poses)[rows], database.planar[frames.ravel()], self.graph.config
+        ).reshape(*shape, 1, 4)
+        there = rotations.rotate(rotations.from_yaw(places[..., 3]), ankles) + places[..., :3]
+        farther: FloatArray = np.linalg.norm((there - own)[..., :2], axis=-1).max(axis=-1)
+        return farther
+
     @staticmethod
-    def _way(seen: Nearest, row: int, moment: int, detour: IntArray) -> WayBack:
-        """The way back of a row of what was looked up, which is a moment."""
+    def _way(
+        seen: Nearest, row: int | tuple[np.intp, ...], moment: int, detour: IntArray
+    ) -> WayBack:
+        """The way back of one entry of what was looked up, and the moment it belongs to."""
         return WayBack(
             moment,
             int(seen.frames[row]),

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.errors import MotionError
-from dynresp.locomotion.graph.database import BoolArray, IntArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph, between
 from dynresp.locomotion.graph.placement import IDENTITY, of_poses, place_poses, place_velocities
+from dynresp.motion.arrays import BoolArray, IntArray
 from dynresp.motion.rotations import FloatArray
 
 
@@ -31,7 +31,7 @@ class Played:
         jumps: (k,) whether a frame was reached by a jump.
         placements: (k, 4) where the clip of each frame was put: its recorded pose, placed there, is
             what was displaced.
-        velocities: (k, 45) how the poses move, to first order in what they are displaced by.
+        velocities: (k, 45) how the poses move.
     """
 
     frames: IntArray
@@ -90,6 +90,15 @@ class Playback:
         playback._age[0] = 0.0
         return playback
 
+    @property
+    def displacement(self) -> FloatArray:
+        """(91,) what is left of blends after the frame played last.
+
+        The displacement at the last jump (45) [m, rad], its rate of change then (45) [1/s], and the
+        time since [s]; see `blending_kernel.displacement_kernel`.
+        """
+        return np.concatenate([self._offset, self._rate, self._age])
+
     def play(self, frames: npt.ArrayLike) -> Played:
         """Play the next frames.
 
@@ -125,8 +134,8 @@ class Playback:
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedSteps:
-    """The recorded poses between which played frames were reached: placed, nothing blended.
+class KnotSteps:
+    """Steps from one pose to another that are as far apart in time as a graph's frames.
 
     Attributes:
         starts: (k, 59) where each step begins.
@@ -141,21 +150,24 @@ class RecordedSteps:
     moving_ends: FloatArray
 
 
-def recorded_steps(graph: MotionGraph, before: int, played: Played) -> RecordedSteps:
-    """What was recorded of what was played.
+def recorded_steps(
+    graph: MotionGraph, before: int, played: Played, some: slice = slice(None)
+) -> KnotSteps:
+    """What was recorded of what was played: placed, nothing blended.
 
     A frame that was jumped to comes from the one recorded before it, which is laid over the frame
     left.
 
     Args:
         graph: Whose frames.
-        before: The frame played before the first.
+        before: The frame played before the first of them.
         played: What was played.
+        some: Which of its frames; by default all.
     """
-    database, entered, places = graph.database, played.frames, played.placements
+    database, entered, places = graph.database, played.frames[some], played.placements[some]
     left = np.concatenate([[before], entered[:-1]])
-    left = np.where(played.jumps, entered - 1, left)
-    return RecordedSteps(
+    left = np.where(played.jumps[some], entered - 1, left)
+    return KnotSteps(
         place_poses(database.poses[left], places),
         place_poses(database.poses[entered], places),
         place_velocities(database.velocities[left], places),

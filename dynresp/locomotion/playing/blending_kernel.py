@@ -113,13 +113,60 @@ def _put(pose, place, offset, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _carry_on(velocity, place, rate, out):  # type: ignore[no-untyped-def]
-    """How a recorded frame moves that is placed and displaced, to first order."""
+def _jacobian(x, y, z, v, inverse, out):  # type: ignore[no-untyped-def]
+    """The right Jacobian of rotations at a rotation vector o = (x, y, z), or its inverse, times v.
+
+    It takes the rate of change of o to the angular velocity of the rotation by o, in the turned
+    frame: 1 - (1 - cos a) / a^2 [o] + (a - sin a) / a^3 [o]^2, where a = |o|.
+    """
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if inverse:
+        first = 0.5
+        if angle < 1e-3:
+            second = 1.0 / 12.0 + square / 720.0
+        else:
+            second = 1.0 / square - 0.5 / (angle * math.tan(0.5 * angle))
+    elif angle < 1e-3:
+        first, second = -0.5 + square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        first = -(1.0 - math.cos(angle)) / square
+        second = (angle - math.sin(angle)) / (square * angle)
+    a, b, c = y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]
+    out[0] = v[0] + first * a + second * (y * c - z * b)
+    out[1] = v[1] + first * b + second * (z * a - x * c)
+    out[2] = v[2] + first * c + second * (x * b - y * a)
+
+
+@njit
+def _turned_back(x, y, z, v, out):  # type: ignore[no-untyped-def]
+    """A vector v seen from a frame that is turned by a rotation vector (x, y, z)."""
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < 1e-3:
+        first, second = 1.0 - square / 6.0, 0.5 - square / 24.0
+    else:
+        first, second = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    a, b, c = y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]
+    out[0] = v[0] - first * a + second * (y * c - z * b)
+    out[1] = v[1] - first * b + second * (z * a - x * c)
+    out[2] = v[2] - first * c + second * (x * b - y * a)
+
+
+@njit
+def _carry_on(velocity, place, offset, rate, out):  # type: ignore[no-untyped-def]
+    """How a recorded frame moves that is placed and displaced."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     out[0] = cosine * velocity[0] - sine * velocity[1] + rate[0]
     out[1] = sine * velocity[0] + cosine * velocity[1] + rate[1]
-    for i in range(2, 45):
-        out[i] = velocity[i] + rate[i]
+    out[2] = velocity[2] + rate[2]
+    turning = np.empty(3)
+    for at in range(3, 45, 3):
+        x, y, z = offset[at], offset[at + 1], offset[at + 2]
+        _turned_back(x, y, z, velocity[at : at + 3], out[at : at + 3])
+        _jacobian(x, y, z, rate[at : at + 3], False, turning)
+        for i in range(3):
+            out[at + i] += turning[i]
 
 
 @njit
@@ -131,9 +178,8 @@ def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):  # t
     offset[2] = pose[2] - (place[2] + recorded[2])
     rate[0] = velocity[0] - (cosine * its_velocity[0] - sine * its_velocity[1])
     rate[1] = velocity[1] - (sine * its_velocity[0] + cosine * its_velocity[1])
-    for i in range(2, 45):
-        rate[i] = velocity[i] - its_velocity[i]
-    turned = np.empty(4)
+    rate[2] = velocity[2] - its_velocity[2]
+    turned, beyond = np.empty(4), np.empty(3)
     for joint in range(14):
         q, at = 3 + 4 * joint, 3 + 3 * joint
         for i in range(4):
@@ -141,6 +187,11 @@ def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):  # t
         if joint == 0:
             _turn(place[3], turned, turned)
         _turn_between(turned, pose[q : q + 4], offset[at : at + 3])
+        x, y, z = offset[at], offset[at + 1], offset[at + 2]
+        _turned_back(x, y, z, its_velocity[at : at + 3], beyond)
+        for i in range(3):
+            beyond[i] = velocity[at + i] - beyond[i]
+        _jacobian(x, y, z, beyond, True, rate[at : at + 3])
 
 
 @compiled(_DISPLACE)
@@ -184,7 +235,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
         age: In and out, (1,) time since then [s].
         played: Out, (k, 59).
         placements: Out, (k, 4) where the clip of each frame was put.
-        moving: Out, (k, 45) how each pose moves, to first order in its displacement.
+        moving: Out, (k, 45) how each pose moves.
     """
     pose, velocity = np.empty(59), np.empty(45)
     now, its_rate = np.empty(45), np.empty(45)
@@ -197,7 +248,7 @@ def play_kernel(  # type: ignore[no-untyped-def]
             now[:], its_rate[:] = offset, rate
             _decay(now, its_rate, age[0], blend_s, rate_s)
             _put(poses[left], place, now, pose)
-            _carry_on(velocities[left], place, its_rate, velocity)
+            _carry_on(velocities[left], place, now, its_rate, velocity)
             _move(place, moves[k, 0], moves[k, 1], moves[k, 2], moves[k, 3])
             _displace(pose, velocity, place, poses[frame - 1], velocities[frame - 1], offset, rate)
             age[0] = 0.0
@@ -208,6 +259,6 @@ def play_kernel(  # type: ignore[no-untyped-def]
         else:
             now[:], its_rate[:] = 0.0, 0.0
         _put(poses[frame], place, now, played[k])
-        _carry_on(velocities[frame], place, its_rate, moving[k])
+        _carry_on(velocities[frame], place, now, its_rate, moving[k])
         for i in range(4):
             placements[k, i] = place[i]

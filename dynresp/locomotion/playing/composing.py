@@ -7,18 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynresp.errors import MotionError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import BoolArray, IntArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import IDENTITY
-from dynresp.locomotion.playing.blending import Playback, recorded_steps
-from dynresp.motion.character import Character
+from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
+from dynresp.locomotion.playing.stance_steps import stand_between
+from dynresp.motion.arrays import BoolArray, IntArray
+from dynresp.motion.character import POSE_SIZE, Character
 from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
 from dynresp.motion.motion import Motion, interpolate_moving
 from dynresp.motion.rotations import FloatArray
 
+MOST_FRAMES = 1_000_000
+"""So many frames are composed at once: an hour at 240 a second. The motion is held in memory four
+times over meanwhile, in 2 GB."""
+
 # A frame so near to a knot is on it, as part of the way between two.
 _ON = 1e-6
+# About so many frames are brought to a frame rate at a time, which saves memory.
+_BLOCK = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,35 +67,46 @@ def compose(
         fps: Frame rate of the motion, by default the graph's.
         fit: How feet are fitted, by default as `FitConfig` says.
         ground: (n, 2) height of the ground under each foot [m], by default 0.
+
+    Raises:
+        MotionError: The motion would have more than `MOST_FRAMES` frames.
     """
     fps = fps or graph.config.fps
     path = np.asarray(frames, dtype=np.int32)
+    step, part = at_rate(len(path), graph.config.fps, fps)
+    if len(step) > MOST_FRAMES:
+        raise MotionError(
+            f"a walk of {len(path) / graph.config.fps:.0f} s at {fps:g} fps has {len(step):,} "
+            f"frames, and at most {MOST_FRAMES:,} are held in memory at once; ask for a shorter "
+            "one or for fewer frames a second"
+        )
     playback = Playback(graph, int(path[0]), place)
     start = np.array(place, dtype=np.float64)
     played = playback.play(path[1:])
     database = graph.database
-    steps = recorded_steps(graph, int(path[0]), played)
     first = placement.place_poses(database.poses[path[:1]], start)
     knots = np.concatenate([first, played.poses])
     moving = placement.place_velocities(database.velocities[path[:1]], start)
     moving = np.concatenate([moving, played.velocities])
-    step, part = at_rate(len(path), graph.config.fps, fps)
-    seconds = 1.0 / graph.config.fps
-    poses = interpolate_moving(
-        knots[step], knots[step + 1], moving[step], moving[step + 1], part, seconds
-    )
-    source = interpolate_moving(
-        steps.starts[step], steps.ends[step], steps.moving_starts[step], steps.moving_ends[step],
-        part, seconds,
-    )  # fmt: skip
     contacts = standing(database.contacts[path, :2], step, part)
+    poses, source = (np.empty((len(step), POSE_SIZE)) for _ in range(2))
+    block = max(1, int(_BLOCK * graph.config.fps / fps))
+    for begin in range(0, len(path) - 1, block):
+        some = slice(begin, min(begin + block, len(path) - 1))
+        rows = slice(*np.searchsorted(step, [some.start, some.stop]))
+        steps = recorded_steps(graph, int(path[begin]), played, some)
+        way = Way(step[rows] - begin, part[rows], 1.0 / graph.config.fps, contacts[rows])
+        after = slice(some.start + 1, some.stop + 1)
+        ours = KnotSteps(knots[some], knots[after], moving[some], moving[after])
+        poses[rows], source[rows] = (between_knots(character, x, way) for x in (ours, steps))
     jumps = np.flatnonzero(played.jumps) + 1
     # The first frame of the motion after the frame left.
     entered = np.unique(np.searchsorted(step, jumps - 1))
-    composed = Composed(
-        poses, source, contacts, entered, fps, graph.config.blend_s, poses[:1], ground
-    )
+    blend_s = graph.config.blend_s
+    composed = Composed(poses, source, contacts, entered, fps, blend_s, poses[:1], ground)
     fitted = fit_feet(character, composed, fit)
+    # Memory that the motion needs to be made.
+    del composed, source, knots, moving
     return Composition(
         frames=path,
         motion=Motion(fitted, fps, "walk by graph", contacts),
@@ -95,6 +114,34 @@ def compose(
         placements=np.concatenate([start[None], played.placements]),
         sliding=poses,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Where frames lie among the steps from knot to knot.
+
+    Attributes:
+        step: (n,) see `at_rate`.
+        part: (n,) see `at_rate`.
+        seconds: How long a step takes [s].
+        stands: (n, 2) see `standing`.
+    """
+
+    step: npt.NDArray[np.intp]
+    part: FloatArray
+    seconds: float
+    stands: BoolArray
+
+
+def between_knots(character: Character, steps: KnotSteps, way: Way) -> FloatArray:
+    """Poses (n, 59) among knots, whose feet do not leave them where they stand."""
+    at = way.step
+    poses = interpolate_moving(
+        steps.starts[at], steps.ends[at], steps.moving_starts[at], steps.moving_ends[at], way.part,
+        way.seconds,
+    )  # fmt: skip
+    ends = steps.starts, steps.ends
+    return stand_between(character, poses, ends, at, way.part, way.stands)
 
 
 def standing(contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray) -> BoolArray:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynresp.errors import UsageError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import BoolArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.blending import Playback, recorded_steps
-from dynresp.locomotion.playing.composing import standing
+from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
+from dynresp.locomotion.playing.composing import Way, between_knots, standing
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import Character
 from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
-from dynresp.motion.motion import interpolate_moving, pose_velocities
+from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import FloatArray
 
 # What was shown is kept as long as it may tell where a foot stands [s].
@@ -52,9 +53,17 @@ class Stream:
             poses: (m, 59) what comes before, as it is shown; a second of it is of use.
             velocity: (45,) how the last of them moves.
             contacts: (m, 2) whether the left and the right foot stand.
+
+        Raises:
+            UsageError: The clock is slower than the graph.
         """
+        if fps < graph.database.fps:
+            raise UsageError(
+                f"a clock of {fps:g} fps is slower than the graph, which has "
+                f"{graph.database.fps:g}; build the graph with as many or fewer"
+            )
         self.graph = graph
-        self.end = first + len(poses)
+        self.end = self._begins = first + len(poses)
         self._character = character
         self._fps = fps
         self._playback = Playback.entering(graph, frame, poses[-1], velocity)
@@ -84,6 +93,13 @@ class Stream:
         """See the class."""
         return self._playback.place.copy()
 
+    def standing(self, now: int) -> BoolArray | None:
+        """(2,) which feet are to stand at a frame of the clock; None where no graph is played."""
+        row = now - self._first
+        if now < self._begins or row >= len(self._contacts):
+            return None
+        return self._contacts[row].copy()
+
     def extend(self, frames: npt.ArrayLike) -> None:
         """Play further frames (k,) of the graph; see `Playback.play`."""
         database, before = self.graph.database, self._playback.frame
@@ -101,17 +117,13 @@ class Stream:
         step = np.ceil((clock - at[0]) / ratio - 1e-9).astype(np.intp) - 1
         step = np.clip(step, 0, count - 1)
         part = np.clip((clock - at[step]) / ratio, 0.0, 1.0)
-        seconds = 1.0 / database.fps
-        poses = interpolate_moving(
-            knots[step], knots[step + 1], moving[step], moving[step + 1], part, seconds
-        )
-        source = interpolate_moving(
-            starts[step], ends[step], steps.moving_starts[step], steps.moving_ends[step], part,
-            seconds,
-        )  # fmt: skip
+        way = Way(step, part, 1.0 / database.fps, standing(touching, step, part))
+        ours = KnotSteps(knots[:-1], knots[1:], moving[:-1], moving[1:])
+        theirs = KnotSteps(starts, ends, steps.moving_starts, steps.moving_ends)
+        poses, source = (between_knots(self._character, x, way) for x in (ours, theirs))
         self._poses = np.concatenate([self._poses, poses])
         self._source = np.concatenate([self._source, source])
-        self._contacts = np.concatenate([self._contacts, standing(touching, step, part)])
+        self._contacts = np.concatenate([self._contacts, way.stands])
         jumped = clock[np.searchsorted(step, np.flatnonzero(played.jumps)).clip(0, len(clock) - 1)]
         self._jumps += [int(frame) for frame in np.unique(jumped) if frame > self._jumps[-1]]
         due = np.round(at[1:]).astype(int)

@@ -240,7 +240,12 @@ def test_who_is_steered_while_hit_goes_there_after_the_return(
     one.until(Phase.PLAYING)
     back = avatar.returns[-1].way
     assert back is not None
-    assert planner.asked[0] == back.frame
+    # First what was recorded there goes on, for as long as the reaction is blended away.
+    blend = round(graph.config.blend_s * graph.database.fps)
+    recorded = [back.frame]
+    while len(recorded) <= blend and graph.targets[graph.offsets[recorded[-1]]] == recorded[-1] + 1:
+        recorded.append(recorded[-1] + 1)
+    assert planner.asked[0] == recorded[-1] > back.frame
 
 
 def _falling(character: Character) -> Motion:

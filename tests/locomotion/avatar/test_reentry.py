@@ -10,13 +10,14 @@ from dynresp.locomotion.avatar.entry_index import EntryIndex
 from dynresp.locomotion.avatar.reentry import ReentryConfig, ReentryPlanner
 from dynresp.locomotion.graph.config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.motion import rotations
-from dynresp.motion.character import ROOT_QUAT, Character
+from dynresp.motion import legs, rotations
+from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.motion import Motion, interpolate, pose_velocities
 from dynresp.motion.rotations import FloatArray
 from tests.locomotion.graph.graph_samples import made_database, wandering_poses
 from tests.locomotion.samples import walking_graph, walking_motions
 from tests.oracles import reentry as oracle
+from tests.oracles.motion_graph import distance
 
 Moments = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -66,8 +67,8 @@ def test_the_nearest_frames_are_those_of_the_slow_twin(
 def test_moment_and_frame_are_found_together(character: Character, seed: int) -> None:
     rng = np.random.default_rng(seed)
     graph = _graph(rng, Coordinates.RELATIVE)
-    config = ReentryConfig(farthest=0.6, waiting=0.1)
-    planner = ReentryPlanner(graph, config)
+    config = ReentryConfig(farthest=0.6, waiting=0.1, apart=0.0)
+    planner = ReentryPlanner(graph, character, config)
     poses, velocities, contacts = _moments(rng, graph)
     times = np.arange(len(poses)) / 5.0
     found = [
@@ -87,9 +88,67 @@ def test_moment_and_frame_are_found_together(character: Character, seed: int) ->
     assert not len(way.detour)
 
 
+def _ankles(character: Character, poses: FloatArray) -> FloatArray:
+    """(m, 2, 2) where ankles are on the ground, seen from the root and where it faces."""
+    ankles = legs.ankle_positions(character, character.kinematics(poses))
+    yaw = -rotations.yaw_of(poses[:, ROOT_QUAT])
+    from_root = ankles - poses[:, None, ROOT]
+    return rotations.rotate(rotations.from_yaw(yaw)[:, None], from_root)[..., :2]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_feet_count_as_far_as_they_are_apart(character: Character, seed: int) -> None:
+    """Moment and frame are the best of all that were considered, one by one."""
+    rng = np.random.default_rng(seed)
+    graph = _graph(rng, Coordinates.RELATIVE)
+    config = ReentryConfig(farthest=0.6, waiting=0.1, apart=0.5, candidates=150)
+    planner = ReentryPlanner(graph, character, config)
+    poses, velocities, contacts = _moments(rng, graph)
+    poses, velocities, contacts = (x[3:] for x in (poses, velocities, contacts))
+    times = np.arange(len(poses)) / 5.0
+    way = planner.find(poses, velocities, contacts, times)
+    assert way is not None
+    own, theirs = (_ankles(character, x) for x in (poses, graph.database.poses))
+    costs = {}
+    for moment in range(len(poses)):
+        for frame in planner.entries.frames.tolist():
+            if (graph.database.contacts[frame, :2] != contacts[moment]).any():
+                continue
+            moving = poses[moment], velocities[moment]
+            recorded = graph.database.poses[frame], graph.database.velocities[frame]
+            d = distance(moving, recorded, character.joint_names, graph.config)
+            apart = np.linalg.norm(own[moment] - theirs[frame], axis=-1).max()
+            costs[moment, frame] = d + 0.1 * times[moment] + 0.5 * apart
+    assert way.same_contacts
+    assert (way.moment, way.frame) == min(costs, key=costs.__getitem__)
+    plain = ReentryPlanner(graph, character, replace(config, apart=0.0))
+    nearest = plain.find(poses, velocities, contacts, times)
+    assert nearest is not None
+    assert nearest.distance <= way.distance + 0.1 * (len(poses) - 1) / 5.0
+
+
+@pytest.mark.parametrize("count", [1, 5, 500])
+def test_several_begin_with_the_nearest(character: Character, count: int) -> None:
+    rng = np.random.default_rng(3)
+    graph = _graph(rng, Coordinates.RELATIVE)
+    index = EntryIndex(graph)
+    moments = _moments(rng, graph)
+    nearest, several = index.nearest(*moments), index.several(*moments, count)
+    assert several.frames.shape == several.distances.shape == (len(moments[0]), count)
+    np.testing.assert_array_equal(several.frames[:, 0], nearest.frames)
+    assert (several.distances >= several.distances[:, :1] - 1e-12).all()
+    for row in range(len(moments[0])):
+        for column in (0, count // 2, count - 1):
+            frame = int(several.frames[row, column])
+            recorded = graph.database.poses[frame], graph.database.velocities[frame]
+            pose = moments[0][row], moments[1][row]
+            expected = distance(pose, recorded, character.joint_names, graph.config)
+            assert several.distances[row, column] == pytest.approx(expected, abs=1e-9)
+
+
 def test_every_entry_is_followed_by_a_frame_of_the_component(character: Character) -> None:
     graph = walking_graph(character)
-    entries = ReentryPlanner(graph).entries.frames
+    entries = ReentryPlanner(graph, character).entries.frames
     following = graph.database.successors[entries]
     assert np.isin(following, graph.frames).all()
 
@@ -113,13 +172,13 @@ def _find(planner: ReentryPlanner, motion: Motion):  # type: ignore[no-untyped-d
 
 
 def test_who_ends_lying_has_no_way_back(character: Character) -> None:
-    planner = ReentryPlanner(walking_graph(character))
+    planner = ReentryPlanner(walking_graph(character), character)
     down = _down(character, walking_motions(character)[0].resampled(15.0))
     assert _find(planner, down) is None
 
 
 def test_a_fall_is_not_left_before_it_is_over(character: Character) -> None:
-    planner = ReentryPlanner(walking_graph(character))
+    planner = ReentryPlanner(walking_graph(character), character)
     down = _down(character, walking_motions(character)[0].resampled(15.0))
     there_and_back = Motion(np.concatenate([down.poses, down.poses[::-1]]), down.fps)
     way = _find(planner, there_and_back)
@@ -137,7 +196,7 @@ def test_a_recording_of_getting_up_brings_back_who_lies(character: Character, en
     if ends == "where others walk":
         up = np.concatenate([up, walk.poses[1:]])
     graph = MotionGraph.build([*motions, Motion(up, 15.0, "up")], GraphConfig(), character)
-    planner = ReentryPlanner(graph)
+    planner = ReentryPlanner(graph, character)
     way = _find(planner, down)
     assert way is not None
     clip = graph.database.clips[-1]
@@ -151,11 +210,13 @@ def test_a_recording_of_getting_up_brings_back_who_lies(character: Character, en
     np.testing.assert_array_equal(way.detour[:-1], clip.start + 1 + np.arange(len(way.detour) - 1))
     assert len(way.detour) > 10
     far = replace(planner.config, farthest_lying=0.0)
-    assert _find(ReentryPlanner(graph, far), down) is None
+    assert _find(ReentryPlanner(graph, character, far), down) is None
 
 
 def test_numbers_that_make_no_sense_are_refused(character: Character) -> None:
     with pytest.raises(UsageError, match="waiting must be at least 0, got -1"):
         ReentryConfig(waiting=-1.0)
+    with pytest.raises(UsageError, match="candidates must be at least 1, got 0"):
+        ReentryConfig(candidates=0)
     with pytest.raises(MotionError, match="at least one frame"):
         EntryIndex(walking_graph(character), [])

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from dynresp.errors import MotionError
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -24,13 +25,37 @@ def differences(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
 
 
 def test_agrees_with_the_slow_twin(graph: MotionGraph) -> None:
-    walk = random_walk(graph, 400, np.random.default_rng(3))
+    walk = random_walk(graph, 200, np.random.default_rng(3))
     played = Playback(graph, int(walk[0])).play(walk[1:])
-    assert played.jumps.sum() > 20
-    slow = oracle.play(graph, int(walk[0]), walk[1:].tolist())
+    assert played.jumps.sum() > 10
+    slow, moving = oracle.play(graph, int(walk[0]), walk[1:].tolist())
+    # The twin's velocities are differences, and so is what it blends.
+    np.testing.assert_allclose(played.velocities, moving, atol=1e-5)
     shift, turn = differences(played.poses, slow)
-    assert shift < 1e-9
-    assert turn < 1e-7
+    assert shift < 1e-6
+    assert turn < 1e-6
+
+
+def test_any_pose_and_velocity_are_met_where_a_blend_begins(
+    graph: MotionGraph, rng: np.random.Generator
+) -> None:
+    """However far off: the velocity by differences of what is displaced."""
+    frame = int(graph.frames[7])
+    recorded, its = graph.database.poses[frame], graph.database.velocities[frame]
+    off = np.concatenate([rng.normal(scale=0.3, size=3), rng.normal(scale=0.8, size=42)])
+    pose = oracle.displaced(recorded, Rotation.from_euler("z", 2.0), np.array([3.0, 1, 0]), off)
+    velocity = rng.normal(scale=2.0, size=45)
+    playback = Playback.entering(graph, frame, pose, velocity)
+    assert playback.displacement.shape == (91,)
+    offset, rate, age = np.split(playback.displacement, [45, 90])
+    x, y, z, yaw = playback.place
+    turn, shift = Rotation.from_euler("z", yaw), np.array([x, y, z])
+    shown = oracle.displaced(recorded, turn, shift, offset)
+    apart = differences(shown[None], pose[None])
+    assert max(apart) < 1e-7
+    moving = oracle.speed(recorded, its, turn, shift, offset, rate)
+    np.testing.assert_allclose(moving, velocity, atol=1e-5)
+    assert age == 0.0
 
 
 def test_pieces_are_the_whole(graph: MotionGraph) -> None:
