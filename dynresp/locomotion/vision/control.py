@@ -20,11 +20,11 @@ import numpy.typing as npt
 from dynresp.errors import UsageError
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.vision.belief import Belief, BeliefConfig
 from dynresp.locomotion.vision.recognition import Recogniser
 from dynresp.locomotion.vision.table import ViewTable
 from dynresp.locomotion.warping import warp_onto_rows
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.rotations import FloatArray
 
 # Added to the belief in every cluster.
@@ -32,7 +32,7 @@ _DOUBT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Action:
+class OpenWay:
     """A way open to the avatar.
 
     Attributes:
@@ -44,7 +44,7 @@ class Action:
     cluster: int
 
 
-def open_actions(forest: ClusterForest, frame: int, within_s: float) -> list[Action]:
+def open_ways(forest: ClusterForest, frame: int, within_s: float) -> list[OpenWay]:
     """The ways open to an avatar at a frame: to stay in its cluster, and all cluster paths.
 
     Args:
@@ -70,7 +70,7 @@ def open_actions(forest: ClusterForest, frame: int, within_s: float) -> list[Act
         frames = forest.stay(way, steps)[1:]
         if len(frames):
             led = np.bincount(labels[frames], minlength=count)
-            out.append(Action(frames, int(led.argmax())))
+            out.append(OpenWay(frames, int(led.argmax())))
     return out
 
 
@@ -170,7 +170,7 @@ class VideoControl:
         both = np.sqrt(told * (followed + _DOUBT))
         self.clusters = self._fading * self.clusters + (1.0 - self._fading) * both / both.sum()
 
-    def choose(self, frame: int) -> Action:
+    def choose(self, frame: int) -> OpenWay:
         """What the avatar does next.
 
         Args:
@@ -182,23 +182,23 @@ class VideoControl:
         if not self._rows:
             raise UsageError("nobody has been seen yet; choose once a row has come")
         config = self._config
-        actions = open_actions(self.forest, frame, config.look_ahead_s)
+        ways = open_ways(self.forest, frame, config.look_ahead_s)
         labels = self.forest.clusters.labels
-        steps = max(len(action.frames) for action in actions)
+        steps = max(len(way.frames) for way in ways)
         fading = np.exp(-np.arange(steps) / (config.patience_s * self.table.fps))
         scores = np.array(
             [
-                np.average(self.clusters[labels[a.frames]], weights=fading[: len(a.frames)])
-                for a in actions
+                np.average(self.clusters[labels[w.frames]], weights=fading[: len(w.frames)])
+                for w in ways
             ]
         )
         good = np.flatnonzero(scores >= scores.max() - config.equal)
         good = good[np.argsort(-scores[good], kind="stable")][: config.compared]
         if len(good) == 1:
-            return actions[good[0]]
+            return ways[good[0]]
         seen = np.array(self._rows)[-round(config.buffer_s * self.table.fps) :]
-        costs = warped_costs(seen, self.table, self.forest, frame, [actions[k] for k in good])
-        return actions[good[int(np.argmin(costs.min(axis=1)))]]
+        costs = warped_costs(seen, self.table, self.forest, frame, [ways[k] for k in good])
+        return ways[good[int(np.argmin(costs.min(axis=1)))]]
 
 
 def warped_costs(
@@ -206,7 +206,7 @@ def warped_costs(
     table: ViewTable,
     forest: ClusterForest,
     frame: int,
-    actions: Sequence[Action],
+    ways: Sequence[OpenWay],
 ) -> FloatArray:
     """How unlike each way is to what was seen, from every viewpoint: the paper's cost.
 
@@ -215,7 +215,7 @@ def warped_costs(
         table: What frames look like.
         forest: Whose ways.
         frame: Where the ways begin.
-        actions: The ways; each may go on when the video ends.
+        ways: The ways; each may go on when the video ends.
 
     Returns:
         (k, views) mean distance of warped rows. The viewpoint is that of the clip of `frame`; it
@@ -225,8 +225,8 @@ def warped_costs(
     views = np.arange(table.views.count)
     planar = forest.graph.database.planar
     pieces, ends = [], [0]
-    for action in actions:
-        along = np.concatenate([[frame], action.frames]).astype(np.int32)
+    for way in ways:
+        along = np.concatenate([[frame], way.frames]).astype(np.int32)
         turned = forest.places_along(along, placement.IDENTITY)[1:, 3] - planar[along[1:], 3]
         shift = np.round(turned / table.views.step).astype(int)
         at = (views[:, None] - shift) % table.views.count
@@ -235,4 +235,4 @@ def warped_costs(
     warped = warp_onto_rows(
         seen.astype(np.float64), np.concatenate(pieces).astype(np.float64), np.cumsum(ends), True
     )
-    return warped.costs.reshape(len(actions), -1) / len(seen)
+    return warped.costs.reshape(len(ways), -1) / len(seen)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.walk import check_in_component, random_walk
 from dynresp.locomotion.vision.control import VideoControl
 from dynresp.locomotion.vision.segmentation import Mask, Picture, SegmentationConfig
-from dynresp.locomotion.vision.watching import Watcher
+from dynresp.locomotion.vision.watching import Sighting, sightings
+from dynresp.motion.arrays import IntArray
 
 CHOICE_S = 0.1
 """Time between choices [s], as in the paper."""
@@ -61,16 +61,28 @@ def follow(
         UsageError: The frame is not in the graph's component, or the frame rate not above 0.
         MotionError: A picture is none, or of another size than those before.
     """
+    check_in_component(control.forest.graph, frame)
+    seen = sightings(pictures, fps, control.table, segmentation)
+    yield from follow_sightings(seen, control, frame, rng)
+
+
+def follow_sightings(
+    seen: Iterable[Sighting], control: VideoControl, frame: int, rng: np.random.Generator
+) -> Iterator[Followed]:
+    """The same from what the pictures told: see `follow` and `sightings`.
+
+    Raises:
+        UsageError: The frame is not in the graph's component.
+    """
     graph = control.forest.graph
     check_in_component(graph, frame)
-    watcher = Watcher(control.table, fps, segmentation)
-    seen = False
+    somebody = False
     played = chosen = 0
-    for count, picture in enumerate(pictures, start=1):
-        for row in watcher.see(picture):
+    for sighting in seen:
+        for row in sighting.rows:
             control.see(row)
-            seen = True
-        time_s = count / fps
+            somebody = True
+        time_s = sighting.time_s
         if int(time_s / CHOICE_S + 1e-9) == chosen:
             continue
         chosen = int(time_s / CHOICE_S + 1e-9)
@@ -78,13 +90,13 @@ def follow(
         played += due
         frames, cluster = np.empty(0, dtype=np.int32), None
         # A way that ends early is followed by another.
-        while seen and len(frames) < due:
-            action = control.choose(frame)
-            cluster = action.cluster if cluster is None else cluster
-            frames = np.concatenate([frames, action.frames[: due - len(frames)]])
+        while somebody and len(frames) < due:
+            way = control.choose(frame)
+            cluster = way.cluster if cluster is None else cluster
+            frames = np.concatenate([frames, way.frames[: due - len(frames)]])
             frame = int(frames[-1])
         if len(frames) < due:
             frames = random_walk(graph, due, rng, frame)
             frame = int(frames[-1])
-        told = int(np.argmax(control.clusters)) if seen else None
-        yield Followed(time_s, frames.astype(np.int32), cluster, told, watcher.mask)
+        told = int(np.argmax(control.clusters)) if somebody else None
+        yield Followed(time_s, frames.astype(np.int32), cluster, told, sighting.mask)

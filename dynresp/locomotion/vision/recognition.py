@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.graph.database import IntArray, MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.vision.table import ViewTable
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.rotations import FloatArray
 
 # Moments that are seen together: so long ago [s].

@@ -14,14 +14,14 @@ import numpy as np
 
 from dynresp.locomotion.clusters.grouping import Clusters
 from dynresp.locomotion.clusters.mixture import MixtureConfig, fit_mixture
-from dynresp.locomotion.clusters.observations import WALK_CYCLE_S
+from dynresp.locomotion.clusters.observations import WALK_CYCLE_S, averaged
 from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character, default_character
 from dynresp.motion.rotations import FloatArray
 
-MOST = 6
+MOST = 5
 """Actions told apart by default: finer ones look too much alike from some sides."""
 
 _PLACES = (
@@ -72,7 +72,7 @@ def sight_observations(database: MotionDatabase, character: Character) -> FloatA
         moving[part, 1] = _SPEED * (cosine * speed[:, 0] + sine * speed[:, 1])
         moving[part, 2] = _SPEED * (cosine * speed[:, 1] - sine * speed[:, 0])
         moving[part, 3] = _TURN * speed[:, 3]
-    return _averaged(database, np.concatenate([_LIMB * np.hstack(places), moving], axis=1))
+    return averaged(database, np.concatenate([_LIMB * np.hstack(places), moving], axis=1))
 
 
 def cluster_by_sight(
@@ -101,16 +101,3 @@ def cluster_by_sight(
     return Clusters(
         fit.mixture, labels, logs.astype(np.float32), examples, spacing, fit.curve, fit.bounded
     )
-
-
-def _averaged(database: MotionDatabase, x: FloatArray) -> FloatArray:
-    """Means of (n, d) over a walk's cycle around each frame, cut at the ends of its clip."""
-    half = round(0.5 * WALK_CYCLE_S * database.fps)
-    out = np.empty_like(x)
-    for clip in database.clips:
-        frames = np.arange(clip.stop - clip.start)
-        sums = np.zeros((len(frames) + 1, x.shape[1]))
-        np.cumsum(x[clip.start : clip.stop], axis=0, out=sums[1:])
-        low, high = np.maximum(frames - half, 0), np.minimum(frames + half + 1, len(frames))
-        out[clip.start : clip.stop] = (sums[high] - sums[low]) / (high - low)[:, None]
-    return out

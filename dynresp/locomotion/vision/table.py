@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,6 +46,8 @@ FORMAT = ArchiveFormat(
 
 # Frames from which the principal components are found.
 _SAMPLE = 1000
+# Frames from one word of progress to the next.
+_TOLD_EVERY = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +84,7 @@ class ViewTable:
         config: FeatureConfig | None = None,
         views: Viewpoints | None = None,
         character: Character | None = None,
+        progress: Callable[[int, int], None] | None = None,
     ) -> ViewTable:
         """Draw all frames and measure their silhouettes: about 0.1 ms each.
 
@@ -89,22 +93,19 @@ class ViewTable:
             config: What is compared.
             views: From where.
             character: Whose they are, by default the product's own.
+            progress: Told how many frames are done, and of how many.
         """
         config, views = config or FeatureConfig(), views or Viewpoints()
         character = character or default_character()
-        shape_mean, basis = _basis(database.poses, character, views, config)
+        shape_mean, basis = shape_basis(_sampled(database.poses, character, views, config), config)
         shapes, tracks, radii = _measured(
-            database.poses, character, views, config.shape, shape_mean, basis
+            database.poses, character, views, config.shape, shape_mean, basis, progress
         )
         motion = _motion(database, views, tracks, radii, config)
-        weights = np.sqrt([config.speed_weight, config.speed_weight, config.growth_weight])
-        motion_mean = motion.mean(axis=(0, 1))
-        scales = weights / np.maximum(motion.std(axis=(0, 1)), 1e-9)
-        rows = np.concatenate([shapes, (motion - motion_mean) * scales], axis=2)
-        mean = np.concatenate([shape_mean, motion_mean])
-        projection = np.zeros((len(mean), rows.shape[2]))
-        projection[: len(shape_mean), : basis.shape[1]] = basis
-        projection[len(shape_mean) :, basis.shape[1] :] = np.diag(scales)
+        mean, projection = joined(shape_mean, basis, motion, config)
+        # Shapes have been projected already, a frame at a time: all as measured would be large.
+        moving = (motion - mean[-3:]) @ projection[-3:, -3:]
+        rows = np.concatenate([shapes, moving], axis=2)
         # Three digits are more than a silhouette has; as in the file.
         kept = rows.astype(np.float16).astype(np.float32)
         identity = table_identity(database, config, views)
@@ -181,18 +182,16 @@ def _told(config: FeatureConfig) -> str:
     return json.dumps({**dataclasses.asdict(config), "shape": config.shape.value}, sort_keys=True)
 
 
-def _basis(
-    poses: FloatArray, character: Character, views: Viewpoints, config: FeatureConfig
-) -> tuple[FloatArray, FloatArray]:
-    """Mean (s,) of shapes, and the matrix (s, k) that leads to weighted, standard numbers."""
-    sample = poses[:: max(1, len(poses) // _SAMPLE)]
-    told = np.array(
-        [
-            measured.shape
-            for _, _, mask in draw_silhouettes(sample, character, views)
-            if (measured := measure(mask, config.shape)) is not None
-        ]
-    )
+def shape_basis(told: FloatArray, config: FeatureConfig) -> tuple[FloatArray, FloatArray]:
+    """What leads from the shapes of a database to weighted, standard numbers.
+
+    Args:
+        told: (s, m) shapes of some silhouettes, as `measure` tells them.
+        config: What is compared.
+
+    Returns:
+        Their mean (m,), and the matrix (m, k) for what is left without it.
+    """
     mean, weight = told.mean(axis=0), np.sqrt(config.shape_weight)
     if config.shape is Shape.HU:
         return mean, np.diag(weight / np.maximum(told.std(axis=0), 1e-9))
@@ -204,6 +203,40 @@ def _basis(
     return mean, first * (weight / np.sqrt(max(variances[-1], 1e-12)))
 
 
+def joined(
+    shape_mean: FloatArray, basis: FloatArray, motion: FloatArray, config: FeatureConfig
+) -> tuple[FloatArray, FloatArray]:
+    """`ViewTable.mean` and `ViewTable.projection`.
+
+    Args:
+        shape_mean: (m,) as `shape_basis` gives it.
+        basis: (m, k) likewise.
+        motion: (..., 3) speeds to the right and up, and growth, of all frames.
+        config: What is compared.
+    """
+    of_all = tuple(range(motion.ndim - 1))
+    weights = np.sqrt([config.speed_weight, config.speed_weight, config.growth_weight])
+    scales = weights / np.maximum(motion.std(axis=of_all), 1e-9)
+    projection = np.zeros((len(shape_mean) + 3, basis.shape[1] + 3))
+    projection[: len(shape_mean), : basis.shape[1]] = basis
+    projection[len(shape_mean) :, basis.shape[1] :] = np.diag(scales)
+    return np.concatenate([shape_mean, motion.mean(axis=of_all)]), projection
+
+
+def sampled(count: int) -> slice:
+    """The frames of so many from which the principal components are found."""
+    return slice(None, None, max(1, count // _SAMPLE))
+
+
+def _sampled(
+    poses: FloatArray, character: Character, views: Viewpoints, config: FeatureConfig
+) -> FloatArray:
+    """Shapes (s, m) of some frames from all viewpoints."""
+    drawn = draw_silhouettes(poses[sampled(len(poses))], character, views)
+    every = (measure(mask, config.shape) for _, _, mask in drawn)
+    return np.array([measured.shape for measured in every if measured is not None])
+
+
 def _measured(
     poses: FloatArray,
     character: Character,
@@ -211,6 +244,7 @@ def _measured(
     shape: Shape,
     mean: FloatArray,
     basis: FloatArray,
+    progress: Callable[[int, int], None] | None,
 ) -> tuple[npt.NDArray[np.float32], FloatArray, FloatArray]:
     """Shapes (n, views, k), and of the silhouettes centres (n, views, 2) and radii (n, views) [m].
 
@@ -229,6 +263,8 @@ def _measured(
         radii[frame, view] = measured.radius
         if view == views.count - 1:
             shapes[frame] = (of_frame - mean) @ basis
+            if progress is not None and frame % _TOLD_EVERY == 0:
+                progress(frame, len(poses))
     right, up, _ = views.axes()
     tracks *= PIXEL
     tracks[..., 0] += poses[:, ROOT] @ right.T

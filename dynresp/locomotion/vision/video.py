@@ -29,6 +29,7 @@ class Video:
     Attributes:
         name: What was opened, for people.
         fps: Pictures per second, as the file or camera says; 30 of a camera that does not say.
+        length: Pictures it holds, as the file says; None of a camera, and where it does not say.
     """
 
     def __init__(self, source: Path | str | int) -> None:
@@ -44,7 +45,7 @@ class Video:
         if not is_camera and not Path(self.name).is_file():
             what = "is a folder" if Path(self.name).is_dir() else "no such file"
             raise MotionFileError(
-                f"{self.name}: {what}; give a video file or the number of a camera"
+                f"{self.name}: {what}; give a video file, or a camera (such as camera:0)"
             )
         # OpenCV warns on standard error of what it cannot read; the errors below say it.
         level = cv2.utils.logging.getLogLevel()
@@ -71,6 +72,8 @@ class Video:
                 f"{self.name}: pictures of {width} x {height} pixels; at most {MAX_SIDE} along a "
                 "side are read, make them smaller"
             )
+        length = float(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        self.length = int(length) if not is_camera and 1.0 <= length <= MAX_FRAMES else None
         told = float(self._capture.get(cv2.CAP_PROP_FPS))
         low, high = _FPS_RANGE
         if math.isfinite(told) and low <= told <= high:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -99,3 +101,42 @@ class Watcher:
             float(np.log(now.radius / before.radius)) / passed,
         )
         return np.concatenate([now.shape, motion])
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """What one picture tells.
+
+    Attributes:
+        time_s: When its time ends, from the first picture on [s].
+        rows: See `Watcher.see`.
+        mask: The person's silhouette; None where nobody is seen.
+    """
+
+    time_s: float
+    rows: list[npt.NDArray[np.float32]]
+    mask: Mask | None
+
+
+def sightings(
+    pictures: Iterable[Picture],
+    fps: float,
+    table: ViewTable,
+    segmentation: SegmentationConfig | None = None,
+) -> Iterator[Sighting]:
+    """Look at pictures as they come, one sighting for each.
+
+    Args:
+        pictures: See `Segmenter`; the first second shows the room alone.
+        fps: How many there are a second.
+        table: What the database's frames look like.
+        segmentation: How the person is told from the room.
+
+    Raises:
+        UsageError: The frame rate is not above 0.
+        MotionError: A picture is none, or of another size than those before.
+    """
+    watcher = Watcher(table, fps, segmentation)
+    for count, picture in enumerate(pictures, start=1):
+        rows = watcher.see(picture)
+        yield Sighting(count / fps, rows, watcher.mask)

@@ -7,7 +7,7 @@ from dynresp.errors import UsageError
 from dynresp.locomotion.vision.control import (
     ControlConfig,
     VideoControl,
-    open_actions,
+    open_ways,
     warped_costs,
 )
 from dynresp.locomotion.vision.recognition import Recogniser
@@ -16,18 +16,18 @@ from tests.locomotion.vision.samples import STEPPING, WAVING
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_open_actions_go_along_the_graph(seed: int) -> None:
+def test_open_ways_go_along_the_graph(seed: int) -> None:
     forest = random_forest(np.random.default_rng(seed), (20, 14), jumps=9)
     graph = forest.graph
-    ways = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
+    edges = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
     for frame in graph.frames[::5].tolist():
-        actions = open_actions(forest, frame, 1.0)
-        assert actions
-        for action in actions:
-            along = [frame, *action.frames.tolist()]
+        ways = open_ways(forest, frame, 1.0)
+        assert ways
+        for way in ways:
+            along = [frame, *way.frames.tolist()]
             assert 2 <= len(along) <= 16
-            assert set(itertools.pairwise(along)) <= ways
-            assert action.cluster in forest.clusters.labels[action.frames]
+            assert set(itertools.pairwise(along)) <= edges
+            assert way.cluster in forest.clusters.labels[way.frames]
 
 
 def test_the_recogniser_tells_what_it_has_learnt(forest, table, recogniser) -> None:
@@ -48,10 +48,10 @@ def test_clusters_without_frames_are_never_told(forest, table) -> None:
 
 
 def test_the_way_that_was_seen_costs_nothing(forest, table) -> None:
-    actions = open_actions(forest, 20, 2.0)
-    seen = table.rows[actions[0].frames[:12], 6]
-    costs = warped_costs(seen, table, forest, 20, actions)
-    assert costs.shape == (len(actions), 18)
+    ways = open_ways(forest, 20, 2.0)
+    seen = table.rows[ways[0].frames[:12], 6]
+    costs = warped_costs(seen, table, forest, 20, ways)
+    assert costs.shape == (len(ways), 18)
     assert costs[0, 6] == pytest.approx(0.0, abs=1e-5)
     assert costs.min() >= 0.0
 

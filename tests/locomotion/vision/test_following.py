@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from dynresp.bench.filming import Filming, film, write_video
 from dynresp.errors import UsageError
 from dynresp.locomotion.vision.control import VideoControl
 from dynresp.locomotion.vision.following import follow
@@ -8,12 +9,12 @@ from dynresp.locomotion.vision.video import Video
 from dynresp.locomotion.vision.watching import Watcher
 from dynresp.motion.motion import Motion
 from tests.locomotion.vision.samples import STEPPING, WAVING, stepping, waving
-from tests.locomotion.vision.video_samples import BODIES, Filming, film, person, write_video
+from tests.locomotion.vision.video_samples import person
 
 
 def acted(who: str, seed: int, folder, fps: float = 30.0) -> list[np.ndarray]:
     """Four seconds of steps and four of waving, another body's and another pace."""
-    somebody = person(BODIES[who], folder)
+    somebody = person(who, folder)
     parts = [act(somebody, round(4 * fps), fps, 0.85) for act in (stepping, waving)]
     filming = Filming(seed, fps=fps, yaw=2.0)
     return list(film(Motion(np.concatenate(parts), fps), somebody, filming))
@@ -43,7 +44,7 @@ def test_an_avatar_follows_a_stranger_in_a_file(forest, table, recogniser, tmp_p
 
 @pytest.mark.parametrize("fps", [10.0, 15.0, 24.0, 60.0])
 def test_there_is_a_row_for_every_frame_of_the_database(table, tmp_path, fps) -> None:
-    somebody = person(BODIES["mmk"], tmp_path)
+    somebody = person("mmk", tmp_path)
     motion = Motion(stepping(somebody, round(2 * fps), fps), fps)
     watcher = Watcher(table, fps)
     rows = [row for p in film(motion, somebody, Filming(8, fps=fps)) for row in watcher.see(p)]

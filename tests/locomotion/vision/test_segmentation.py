@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
+from dynresp.bench.filming import Filming, film
 from dynresp.errors import MotionError
 from dynresp.locomotion.vision.segmentation import SegmentationConfig, Segmenter
 from dynresp.motion.motion import Motion
 from tests.locomotion.vision.samples import stepping, waving
-from tests.locomotion.vision.video_samples import BODIES, Filming, film, person
+from tests.locomotion.vision.video_samples import person
 
 
 def overlap(a: np.ndarray, b: np.ndarray) -> float:
@@ -14,7 +15,7 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
 
 @pytest.mark.parametrize(("seed", "who"), [(1, "02"), (2, "127"), (3, "17")])
 def test_somebody_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> None:
-    somebody = person(BODIES[who], tmp_path)
+    somebody = person(who, tmp_path)
     act = stepping if seed == 1 else waving
     motion = Motion(act(somebody, 120, 30.0), 30.0)
     masks: list[np.ndarray] = []
@@ -27,7 +28,7 @@ def test_somebody_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> N
 
 
 def test_somebody_who_stands_still_does_not_fade(tmp_path) -> None:
-    somebody = person(BODIES["16"], tmp_path)
+    somebody = person("16", tmp_path)
     motion = Motion(np.tile(somebody.rest_pose, (300, 1)), 10.0)
     masks: list[np.ndarray] = []
     segmenter = Segmenter(10.0)

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from dynresp.bench.filming import SIZE, write_video
 from dynresp.errors import MotionFileError
 from dynresp.locomotion.vision.video import Video
-from tests.locomotion.vision.video_samples import SIZE, write_video
 
 
 @pytest.mark.parametrize(("codec", "ending"), [("mp4v", "mp4"), ("MJPG", "avi")])
