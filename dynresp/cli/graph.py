@@ -8,6 +8,7 @@ from dynresp.cli.graph_build import build
 from dynresp.cli.graph_info import info
 from dynresp.cli.graph_sketch import sketch
 from dynresp.cli.graph_walk import walk
+from dynresp.cli.graph_watch import watch
 
 app = typer.Typer(
     help="Motion graphs: avatars that walk on for ever through recorded motion.",
@@ -18,3 +19,4 @@ app.command()(build)
 app.command()(info)
 app.command()(walk)
 app.command()(sketch)
+app.command()(watch)

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.errors import MissingMotionDataError, SpecError, UnknownNameError
+from dynresp.errors import MissingMotionDataError, SpecError
 from dynresp.graphs import building
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import GraphPlan, find_plan, read_plan
@@ -54,9 +54,9 @@ def test_only_the_folder_that_is_named_is_looked_through(
     looked: list[Path] = []
     listed = building.list_motion_files
 
-    def watched(where: Path) -> list[Path]:
+    def watched(where: Path, levels: int) -> list[Path]:
         looked.append(where)
-        return listed(where)
+        return listed(where, levels)
 
     monkeypatch.setattr(building, "list_motion_files", watched)
     for motions in ([folder], [folder / "photos", folder]):
@@ -72,9 +72,31 @@ def test_wildcards_stay_inside_their_folder(folder: Path, character: Character, 
         build_graph(plan(name), [folder], folder / "walks", character, quiet)
 
 
-def test_built_in_motion_has_no_wildcards(folder: Path, character: Character) -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown built-in motion 'w\*'"):
-        build_graph(plan("builtin:w*"), [folder], folder, character, quiet)
+@pytest.mark.parametrize("name", ["builtin:w*", "builtin:*"])
+def test_built_in_motion_has_no_wildcards(folder: Path, character: Character, name: str) -> None:
+    with pytest.raises(SpecError, match=r"named one by one.*; there are .*\bwalk\b"):
+        build_graph(plan(name), [folder], folder, character, quiet)
+
+
+def test_wildcards_stand_for_no_folders(folder: Path, character: Character) -> None:
+    with pytest.raises(MissingMotionDataError, match=r"\*\.npz"):
+        build_graph(plan("*.npz"), [folder], folder, character, quiet)
+    (folder / "walks").rename(folder / "old")
+    (folder / "walks").mkdir()
+    (folder / "old").rename(folder / "walks" / "old")
+    with pytest.raises(MissingMotionDataError, match=r"walks/\*\.npz"):
+        build_graph(plan("walks/*.npz"), [folder], folder, character, quiet)
+    graph = build_graph(plan("*/old/*.npz"), [folder], folder, character, quiet)
+    assert len(graph.database.clips) == 4
+
+
+def test_what_is_left_out_must_be_there(folder: Path, character: Character) -> None:
+    wrong = plan("walks/*.npz", leave_out=["walks/walk_03.npz"])
+    with pytest.raises(SpecError, match=r"'walks/walk_03.npz' is none of the 4.*walks/walk_3.npz"):
+        build_graph(wrong, [folder], folder, character, quiet)
+    nothing = plan("walks/walk_3.npz", leave_out=["walks/walk_3.npz"])
+    with pytest.raises(SpecError, match="leave_out names all motions"):
+        build_graph(nothing, [folder], folder, character, quiet)
 
 
 def test_progress_is_told(folder: Path, character: Character) -> None:

@@ -47,6 +47,10 @@ def test_settings(tmp_path: Path) -> None:
     [
         ("name", "nam", r"graph\.nam is not a key of \[graph\] \(did you mean 'name'\?\)"),
         ('name = "small"', "", "graph.name is missing; say in a few words"),
+        ("[[motion]]", "[motion]", r"motion: write \[\[motion\]\], with two brackets on each side"),
+        ("[graph]", "[[graph]]", r"graph: expected a table \[graph\], got \["),
+        ("[graph]", 'leave_out = "a.bvh"\n[graph]', "leave_out: expected a list in brackets, got"),
+        ("[graph]", "leave_out = [3]\n[graph]", "leave_out: expected text in quotes, got 3"),
         ("[[motion]]", "[[motions]]", r"motions is not a key of the file"),
         ('"builtin:walk"', '"builtin:walk"\nstart_s = -1', "motion.start_s: expected a number"),
         ('"small"', '"small"\nfps = 0', "graph.fps: expected a number from 1 to 240 frames"),
@@ -63,6 +67,12 @@ def test_settings(tmp_path: Path) -> None:
 def test_mistakes_are_told(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(SpecError, match=said):
         read_plan(written(tmp_path, SMALL.replace(old, new, 1)))
+
+
+def test_a_plan_without_motions_is_told(tmp_path: Path) -> None:
+    text = 'motion = []\n[graph]\nname = "small"\n'
+    with pytest.raises(SpecError, match=r"motion: expected at least 1 table \[\[motion\]\], got 0"):
+        read_plan(written(tmp_path, text))
 
 
 @pytest.mark.parametrize("name", plan_names())

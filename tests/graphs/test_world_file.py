@@ -1,7 +1,10 @@
 import math
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from dynresp.errors import SpecError
 from dynresp.graphs.world_file import read_world
@@ -56,9 +59,38 @@ def test_mistakes_are_told(tmp_path: Path, old: str, new: str, said: str) -> Non
         read_world(written(tmp_path, WORLD.replace(old, new, 1)))
 
 
-def test_many_boxes_need_a_small_world(tmp_path: Path) -> None:
-    box = "[[box]]\ncenter = [1, 1]\nsize = [0.1, 0.1]\n"
-    text = "[world]\nbounds = [0, 0, {0}, {0}]\n" + 2000 * box
-    assert len(read_world(written(tmp_path, text.format(20))).obstacles) == 2000
-    with pytest.raises(SpecError, match=r"10000 m2 may have at most 396 boxes, got 2000; leave"):
-        read_world(written(tmp_path, text.format(100)))
+def test_one_bracket_is_told(tmp_path: Path) -> None:
+    text = WORLD[: WORLD.rindex("[[box]]")].replace("[[box]]", "[box]")
+    with pytest.raises(SpecError, match=r"box: write \[\[box\]\], with two brackets on each side"):
+        read_world(written(tmp_path, text))
+
+
+def test_a_large_world_may_have_many_boxes(tmp_path: Path) -> None:
+    box = "[[box]]\ncenter = [{0}, 1]\nsize = [{1}, {1}]\n"
+    text = "[world]\nbounds = [0, 0, 200, 200]\n"
+    many = "".join(box.format(k / 10, 0.1) for k in range(2000))
+    assert len(read_world(written(tmp_path, text + many)).obstacles) == 2000
+    large = "".join(box.format(k, 400) for k in range(40))
+    with pytest.raises(SpecError, match=r"40 boxes are too large and too many"):
+        read_world(written(tmp_path, text + large))
+
+
+_NUMBERS = ("0", "-1", "1e400", "nan", "inf", "9" * 400)
+_LISTS = ("[]", "[1]", "[1, 2]", "[1e308, -1e308]", "[-1, -2, 3, 4]", "[nan, 1]", "[[1, 2]]")
+_VALUES = st.sampled_from((*_NUMBERS, *_LISTS, "true", '""', '["a", 1]', "{}", "1979-05-27"))
+_NAMES = st.sampled_from(["bounds", "center", "size", "turn_deg", "height_m", "box", "world", "x"])
+_HEADS = st.sampled_from(["[world]", "[[box]]", "[box]", "[[world]]", "[box.x]", ""])
+_TABLES = st.lists(st.tuples(_HEADS, st.dictionaries(_NAMES, _VALUES, max_size=4)), max_size=4)
+
+
+@given(_TABLES)
+@settings(max_examples=200)
+def test_whatever_a_file_holds_it_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, tables: list[tuple[str, dict[str, str]]]
+) -> None:
+    text = "".join(
+        f"{head}\n" + "".join(f"{name} = {value}\n" for name, value in content.items())
+        for head, content in tables
+    )
+    with suppress(SpecError):
+        read_world(written(tmp_path_factory.mktemp("fuzz"), text))
