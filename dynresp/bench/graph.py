@@ -25,13 +25,14 @@ from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult, Contender, median_seconds
 from dynresp.errors import DynrespError, MotionError
 from dynresp.locomotion.graph.config import GraphConfig
-from dynresp.locomotion.graph.database import BoolArray, MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.graph.file import load_graph, save_graph
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.pruning import find_transitions
 from dynresp.locomotion.graph.walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.playing.composing import compose
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import Character, default_character
 
 FRAMES = 12_879

@@ -1,8 +1,9 @@
-"""Databases of any number of frames for benchmarks of motion graphs."""
+"""Graphs and databases of any number of frames for benchmarks of motion graphs."""
 
 from __future__ import annotations
 
-from contextlib import suppress
+import functools
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +12,10 @@ import numpy as np
 from dynresp.errors import MissingMotionDataError
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import find_plan, read_plan
-from dynresp.locomotion.graph.database import BoolArray, Clip, MotionDatabase
+from dynresp.locomotion.graph.database import Clip, MotionDatabase
+from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
+from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 from dynresp.motion.sources import motion_folders
@@ -66,6 +69,39 @@ def _deviating(poses: FloatArray, fps: float, rng: np.random.Generator) -> Float
     return np.concatenate([poses[:, :3], turned.reshape(len(poses), -1)], axis=1)
 
 
+def graphs_at_hand(
+    names: Sequence[str], folders: Sequence[Path], character: Character, needed: bool = False
+) -> Iterator[tuple[str, MotionGraph]]:
+    """The graphs of plans, one after the other, with the names of their plans.
+
+    Args:
+        names: Of plans that come with dynresp, or plan files.
+        folders: Motions folders.
+        character: The character.
+        needed: Whether all must be there; else those are left out whose motions are not on this
+            machine.
+
+    Raises:
+        MissingMotionDataError: Motions are not on this machine and were needed.
+        DynrespError: There is no such plan, or motions cannot be read.
+    """
+    for name in names:
+        path = find_plan(name)
+        try:
+            graph = _built(path, tuple(folders), character)
+        except MissingMotionDataError:
+            if needed:
+                raise
+            continue
+        yield path.stem, graph
+
+
+@functools.lru_cache(maxsize=8)
+def _built(path: Path, folders: tuple[Path, ...], character: Character) -> MotionGraph:
+    """The graph of a plan; most of the time goes into reading motions, and parts share them."""
+    return build_graph(read_plan(path), folders, path.parent, character, lambda *_: None)
+
+
 def recorded_database(motions: Path | None, character: Character) -> tuple[str, MotionDatabase]:
     """The frames of the first plan whose motions are on this machine.
 
@@ -79,13 +115,8 @@ def recorded_database(motions: Path | None, character: Character) -> tuple[str, 
     Raises:
         DynrespError: Motions cannot be read.
     """
-    folders = motion_folders(motions)
-    for name in PLANS:
-        path = find_plan(name)
-        with suppress(MissingMotionDataError):
-            plan = read_plan(path)
-            graph = build_graph(plan, folders, path.parent, character, lambda *_: None)
-            return name, graph.database
+    for name, graph in graphs_at_hand(PLANS, motion_folders(motions), character):
+        return name, graph.database
     raise MissingMotionDataError("built-in motion is missing; install dynresp again")
 
 

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.graph.config import GraphConfig
-from dynresp.locomotion.graph.database import BoolArray, IntArray, MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.graph.distance import FrameFeatures, frame_distances, frame_features
 from dynresp.locomotion.graph.pruning import step_groups, stutter_frames
+from dynresp.motion.arrays import BoolArray, IntArray
 from dynresp.motion.rotations import FloatArray
 
 # Pairs compared at once: what is gathered for them, about 200 MiB, is reused.

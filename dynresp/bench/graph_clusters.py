@@ -1,0 +1,69 @@
+"""Clusters without seeds picked by hand, beside the best of random starts."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from dynresp.bench.graph_figures import WORLDS, Measurement, Value
+from dynresp.locomotion.clusters.grouping import ClusterConfig, Clusters
+from dynresp.locomotion.clusters.mixture import fit_from_means
+from dynresp.locomotion.clusters.observations import observations
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.character import Character
+
+
+def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
+    """Cluster the frames of a graph, and fit mixtures of as many clusters from random frames.
+
+    Args:
+        graph: The graph.
+        character: The character.
+        count: Random starts.
+        seed: Of these.
+    """
+    from threadpoolctl import threadpool_limits
+
+    config = ClusterConfig()
+    start = time.perf_counter()
+    clusters = Clusters.of(graph, config, character=character)
+    seconds = time.perf_counter() - start
+    x = observations(graph.database, graph.config.coordinates, character)
+    x = x[graph.frames[clusters.spacing // 2 :: clusters.spacing]]
+    rng = np.random.default_rng(seed)
+    start = time.perf_counter()
+    with threadpool_limits(limits=1):
+        tried = [
+            fit_from_means(x, x[rng.choice(len(x), len(clusters), replace=False)], config.mixture)
+            for _ in range(count)
+        ]
+    trying_s = time.perf_counter() - start
+    likelihoods = [mixture.log_likelihood(x) for mixture in tried]
+    own = clusters.mixture.log_likelihood(x)
+    return {
+        "frames": len(graph.frames),
+        "observations": len(x),
+        "clusters": len(clusters),
+        "clustering_s": seconds,
+        "log_likelihood": own,
+        "bic": clusters.mixture.bic(x),
+        "random_starts": count,
+        "random_starts_s": trying_s,
+        "random_best_log_likelihood": max(likelihoods),
+        "random_best_bic": max(mixture.bic(x) for mixture in tried),
+        "random_median_log_likelihood": float(np.median(likelihoods)),
+        "log_likelihood_gained": own - max(likelihoods),
+    }
+
+
+MEASUREMENT = Measurement(
+    measure,
+    WORLDS,
+    20,
+    {"log_likelihood_gained": "at least 0", "clustering_s": "seconds"},
+    (
+        "Random starts have as many clusters, a number that growing finds by the way and they are "
+        "given, begin at frames drawn at random, and run as long.",
+    ),
+)
