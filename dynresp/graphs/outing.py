@@ -11,7 +11,7 @@ import numpy as np
 
 from dynresp.experiments.folder import RESULT, WRITTEN, clear_response
 from dynresp.experiments.result import versions, write_json
-from dynresp.experiments.story_files import Progress, Writer, story_writers, write_files
+from dynresp.experiments.story_files import Writer, story_writers, write_files
 from dynresp.graphs.worlds import standing_about
 from dynresp.locomotion.graph.file import graph_identity
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -20,13 +20,16 @@ from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.skating import foot_skates
+from dynresp.progress import Progress
 from dynresp.response.quality import joint_speed_steps
-from dynresp.view.story import Block, Event, GroundPath, MovingSphere, Phase, Story
+from dynresp.view.story import Block, GroundPath, MovingSphere, Story, StoryEvent, StoryPhase
 
 PLAN = "plan.png"
 FILES = ("motion.npz", "motion.bvh", "recording.html", "filmstrip.png", PLAN, "video.mp4")
 """What is written of an outing besides `result.json`."""
 
+# A stance of a walk lasts half a second: with fewer frames a second hardly any has two steps [1/s].
+_SKATE_FPS = 10.0
 _VIDEO_PX, _VIDEO_FPS = (640, 480), 30.0
 
 
@@ -42,6 +45,7 @@ class Outing:
         sliding: The motion before its feet were fitted; None where that is not known.
         blocks: What stood about.
         paths: What was drawn on the ground.
+        bounds: How far it could go, (x, y, x, y) of two corners [m]; None where there is no bound.
         spheres: Balls.
         events: Moments with names.
         phases: What drove the avatar when.
@@ -57,9 +61,10 @@ class Outing:
     sliding: Motion | None = None
     blocks: Sequence[Block] = ()
     paths: Sequence[GroundPath] = ()
+    bounds: tuple[float, float, float, float] | None = None
     spheres: Sequence[MovingSphere] = ()
-    events: Sequence[Event] = ()
-    phases: Sequence[Phase] = ()
+    events: Sequence[StoryEvent] = ()
+    phases: Sequence[StoryPhase] = ()
     arrived: bool = True
     about: dict[str, Any] = field(default_factory=dict)
     writers: dict[str, Writer] = field(default_factory=dict)
@@ -107,6 +112,7 @@ def write_outing(
         blocks=[*outing.blocks, *standing],
         capsules=bars,
         paths=outing.paths,
+        bounds=outing.bounds,
         title=outing.title,
         subtitle=outing.subtitle,
     )
@@ -165,15 +171,20 @@ def figures(outing: Outing, character: Character) -> dict[str, Any]:
         "speed_m_s": way / motion.duration if motion.duration > 0 else 0.0,
         "jumps": None if outing.jumps_s is None else len(outing.jumps_s),
         "joint_speed_step_99_rad_s": float(np.percentile(steps, 99.0)) if steps.size else 0.0,
-        "foot_skate_m": _skate(motion, character),
+        "foot_skate_m": skate(motion, character),
     }
     if outing.sliding is not None:
-        said["foot_skate_as_blended_m"] = _skate(outing.sliding, character)
+        said["foot_skate_as_blended_m"] = skate(outing.sliding, character)
     return said
 
 
-def _skate(motion: Motion, character: Character) -> dict[str, Any]:
-    """How far feet slide a stance [m]."""
+def skate(motion: Motion, character: Character) -> dict[str, float] | None:
+    """How far feet slide a stance [m]: `median`, `percentile_95`, `worst`; 0 without a stance.
+
+    None of a motion with too few frames a second to tell.
+    """
+    if motion.fps < _SKATE_FPS:
+        return None
     slips = foot_skates(motion, character) or [0.0]
     return {
         "median": float(np.median(slips)),

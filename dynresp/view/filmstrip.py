@@ -2,7 +2,7 @@
 
 Above, the character at chosen moments, side by side and labelled; below, smaller, the same figures
 where they were, with the ways of the balls and a ruler. Where the character travels far enough for
-the figures to stand clear of each other, one picture serves for both.
+the figures to stand clear of each other, and not too far, one picture serves for both.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from dynresp.files import replacing
 from dynresp.motion.rotations import FloatArray
 from dynresp.view import raster, shapes
+from dynresp.view.apart import settle, spread
 from dynresp.view.cast import Cast
 from dynresp.view.moments import Moment, camera_yaw, choose_moments, main_direction
 from dynresp.view.shapes import PHASE_COLORS
@@ -33,8 +34,12 @@ _DPI = 200
 # Half the height of the strip of floor in the picture [m].
 _FLOOR_DEPTH = 0.26
 # Heights of what is not figures, and the margin at the sides [inch].
-_HEADING, _LABELS, _RULER = 0.62, 0.55, 0.30
+_HEADING, _LABELS, _TIMES, _CAPTION, _RULER = 0.62, 0.55, 0.38, 0.24, 0.30
 _MARGIN = 0.15
+# What is no higher than this [m] is on the ground, and there is floor under it.
+_GROUND = 0.01
+# How far below and above the figures what stands there is shown [m].
+_BEYOND = 2.5
 # A block whose middle is this near to a figure [m] is drawn with it.
 _UNDERFOOT = 0.5
 
@@ -49,7 +54,9 @@ class FilmstripConfig:
         turn_deg: How far the camera stands ahead of the character's side.
         elevation_deg: How far it looks down.
         overlap: Share of a figure's width that its neighbour may cover.
-        shift: If no figure had to be moved further than this [m] to stand clear, none is.
+        shift: If no figure had to be moved further than this [m] to stand clear, none is,
+        widest: unless the whole way is wider than this [m].
+        gap: Where figures are moved, none stands farther from its neighbour than this [m].
         near: Things within this distance of the pelvis are drawn with a figure [m].
         faintest: How opaque the earliest figure is where figures overlie.
         lower_scale: Scale of the lower picture in that of the upper one.
@@ -62,6 +69,8 @@ class FilmstripConfig:
     elevation_deg: float = 11.0
     overlap: float = 0.10
     shift: float = 0.25
+    widest: float = 14.0
+    gap: float = 0.6
     near: float = 0.6
     faintest: float = 0.5
     lower_scale: float = 0.6
@@ -104,12 +113,13 @@ class _Strip:
         from matplotlib.figure import Figure
 
         extents = np.array([self._extent(moment) for moment in self.moments])
+        far = float(extents[:, 1].max() - extents[:, 0].min()) > self.config.widest
         # Where each figure is a pair, a gap shows who belongs to whom.
         overlap = -self.config.overlap if self.story.others else self.config.overlap
-        shifts = spread(extents[:, :2], overlap)
-        apart = bool(shifts[-1] > self.config.shift)
+        apart = far or bool(spread(extents[:, :2], overlap)[-1] > self.config.shift)
         offsets = np.zeros((len(self.moments), 2))
         if apart:
+            shifts = spread(extents[:, :2], overlap, self.config.gap)
             offsets = np.stack([shifts, -self.prints[:, 1]], axis=1)
         moved = extents + np.repeat(offsets, 2, axis=1)
         left, right = float(moved[:, 0].min()) - 0.12, float(moved[:, 1].max()) + 0.12
@@ -123,19 +133,15 @@ class _Strip:
         )
         panels = [upper]
         if apart:
-            pixel = upper.pixel / self.config.lower_scale
-            half = 0.5 * self.config.width_px * pixel
-            middle = 0.5 * float(extents[:, 0].min() + extents[:, 1].max())
-            low, high = float(extents[:, 2].min()), float(extents[:, 3].max()) + 0.06
-            low = min(low, self._lowest_ball(middle - half, middle + half)) - 0.1
-            panels.append(_Panel(middle - half, high, low, pixel, self.config.width_px))
-        parts = [_HEADING, upper.height / _DPI, _LABELS]
+            panels.append(self._lower_panel(extents, upper.pixel))
+        labels = _LABELS if any(moment.events for moment in self.moments) else _TIMES
+        parts = [_HEADING, upper.height / _DPI, labels]
         parts[2:2] = [] if apart else [_RULER]
-        parts += [panels[1].height / _DPI, _RULER] if apart else []
+        parts += [_CAPTION, panels[1].height / _DPI, _RULER] if apart else []
         height = sum(parts)
         figure = Figure((self.config.width_px / _DPI, height), dpi=_DPI, facecolor="white")
         ends = 1.0 - np.cumsum(parts) / height
-        for panel, top in zip(panels, (ends[0], ends[2]), strict=False):
+        for panel, top in zip(panels, (ends[0], ends[-3]), strict=False):
             panel.open(figure, top)
         if apart:
             self._figures(upper, offsets, self.config.near)
@@ -143,14 +149,36 @@ class _Strip:
         self._labels(figure, upper, offsets, ends[1 if apart else 2], height)
         self._heading(figure, height)
         if apart:
-            figure.text(_MARGIN / figure.get_figwidth(), ends[2] - 0.1 / height,
-                        "as they were; above, moved apart sideways", va="top", fontsize=7.5,
+            figure.text(_MARGIN / figure.get_figwidth(), ends[2] - 0.04 / height,
+                        "as they were; above, moved sideways", va="top", fontsize=7.5,
                         color=_FAINT_INK)  # fmt: skip
         return figure
+
+    def _lower_panel(self, extents: FloatArray, pixel: float) -> _Panel:
+        """Where the figures are as they were, and what stands there: a smaller picture.
+
+        Args:
+            extents: (moments, 4) left, right, bottom and top of the figures.
+            pixel: Size of a pixel of the upper picture [m].
+        """
+        left, right = float(extents[:, 0].min()), float(extents[:, 1].max())
+        pixel = max(pixel / self.config.lower_scale, (right - left + 0.6) / self.config.width_px)
+        half, middle = 0.5 * self.config.width_px * pixel, 0.5 * (left + right)
+        lowest, highest = float(extents[:, 2].min()), float(extents[:, 3].max())
+        low, high = lowest, highest
+        for mesh in (*self.cast.blocks(), *self.cast.bars(), *self.cast.edge()):
+            x, y, _ = self.view.screen(mesh.vertices).T
+            if x.max() > middle - half and x.min() < middle + half:
+                low, high = min(low, float(y.min())), max(high, float(y.max()))
+        ball = self._lowest_ball(middle - half, middle + half)
+        low = min(max(low, lowest - _BEYOND), max(ball, lowest - 1.0))
+        high = min(high, highest + _BEYOND)
+        return _Panel(middle - half, high + 0.06, low - 0.1, pixel, self.config.width_px)
 
     def _extent(self, moment: Moment) -> tuple[float, float, float, float]:
         """Left, right, bottom and top of what is drawn at a moment."""
         meshes = self.cast.meshes(moment.frame, None, 0.0, self.config.near)
+        meshes += self.cast.underfoot(moment.frame, _UNDERFOOT)
         points = self.view.screen(np.concatenate([mesh.vertices for mesh in meshes]))
         (left, bottom, _), (right, top, _) = points.min(axis=0), points.max(axis=0)
         return float(left), float(right), float(bottom), float(top)
@@ -161,17 +189,25 @@ class _Strip:
         """The figures in the order of time, the later over the earlier, all shadows below."""
         fade = np.linspace(faintest, 1.0, len(self.moments))
         shadows, figures = panel.canvas(), panel.canvas()
-        self._floor(panel, shadows, float((self.prints + offsets)[:, 1].mean()))
-        standing = [] if np.isfinite(within) else self.cast.blocks()
+        at = (self.prints + offsets)[:, 1]
+        standing = [] if np.isfinite(within) else self.cast.standing()
+        for mesh in standing:
+            low = mesh.vertices[mesh.vertices[:, 2] <= _GROUND]
+            at = np.append(at, np.clip(self.view.screen(low)[:, 1], panel.bottom, panel.top))
+        self._floor(panel, shadows, float(at.min()), float(at.max()))
         if standing:
-            figures.lay(raster.draw(standing, self.view, panel.pixel), 0, 0, 1.0)
+            bars = self.cast.bars()
+            if bars:
+                shadow = raster.floor_shadow(bars, self.yaw, self.elevation, panel.pixel)
+                shadows.lay(shadow, 0, 0, 0.5)
+            figures.lay(raster.draw(standing, self.view, panel.pixel, canvas=figures))
         for moment, offset, alpha in zip(self.moments, offsets, fade, strict=True):
             meshes = self.cast.meshes(moment.frame, moment.phase, 0.9, within)
             right, up = (round(float(x) / panel.pixel) for x in offset)
             shadow = raster.floor_shadow(meshes, self.yaw, self.elevation, panel.pixel)
             shadows.lay(shadow, right, up, 0.5 * float(alpha))
             if not standing:
-                meshes = [*meshes, *self.cast.underfoot(moment.frame, _UNDERFOOT)]
+                meshes += self.cast.underfoot(moment.frame, _UNDERFOOT)
             figures.lay(raster.draw(meshes, self.view, panel.pixel), right, up, float(alpha))
         panel.show(shadows, 1.0)
         panel.show(figures, 4.0)
@@ -190,14 +226,14 @@ class _Strip:
             panel.axes.plot(*way.T, color=shapes.BALL_COLOR, lw=1.2, alpha=0.7, zorder=3.0)
 
     def _lowest_ball(self, left: float, right: float) -> float:
-        """How low in the picture a ball is drawn between two edges, at most a metre down."""
+        """How low in the picture a ball is drawn between two edges."""
         lowest = 0.0
         for ball in self.story.spheres:
             frames = [m.frame for m in self.moments if m.frame < len(ball.positions)]
             x, y, _ = self.view.screen(ball.positions[frames]).T
             seen = y[(x > left) & (x < right)]
             lowest = min(lowest, *(seen - ball.radius)) if len(seen) else lowest
-        return max(lowest, -1.0)
+        return lowest
 
     def _hit(self, positions: FloatArray) -> int | None:
         """The moment at which a ball is nearest to the character, None if it is at none."""
@@ -226,7 +262,7 @@ class _Strip:
             x = origin + metre * step
             axes.plot([x, x], [bottom, bottom - 0.05 * inch], color=_FAINT_INK, lw=0.8,
                       clip_on=False)  # fmt: skip
-            axes.text(x, bottom - 0.08 * inch, f"{metre:.0f} m", ha="center", va="top",
+            axes.text(x, bottom - 0.08 * inch, f"{metre + 0.0:.0f} m", ha="center", va="top",
                       fontsize=6.5, color=_FAINT_INK)  # fmt: skip
 
     def _labels(
@@ -236,13 +272,17 @@ class _Strip:
         inches = figure.get_figwidth()
         anchors = (self.prints[:, 0] + offsets[:, 0] - panel.left) / (panel.right - panel.left)
         words = [" · ".join(moment.events) for moment in self.moments]
-        widths = np.array([max(0.50, 0.064 * len(word) + 0.08) for word in words]) / inches
+        times = [f"{moment.time_s:.2f} s" for moment in self.moments]
+        pairs = zip(words, times, strict=True)
+        widths = np.array([max(0.064 * len(a), 0.082 * len(b)) + 0.08 for a, b in pairs]) / inches
         centers = settle(anchors, widths)
         y = top - 0.12 / height
-        for moment, word, anchor, center in zip(self.moments, words, anchors, centers, strict=True):
+        for moment, word, time, anchor, center in zip(
+            self.moments, words, times, anchors, centers, strict=True
+        ):
             if abs(anchor - center) > 0.1 / inches:
                 figure.add_artist(_line(figure, (anchor, top), (center, y + 0.01 / height)))
-            figure.text(center, y, f"{moment.time_s:.2f} s", ha="center", va="top", fontsize=8.5,
+            figure.text(center, y, time, ha="center", va="top", fontsize=8.5,
                         color=_INK, fontweight="bold")  # fmt: skip
             color = _INK if moment.phase is None else PHASE_COLORS[moment.phase]
             figure.text(center, y - 0.17 / height, word, ha="center", va="top", fontsize=8,
@@ -272,9 +312,10 @@ class _Strip:
                           borderaxespad=0.0, handletextpad=0.1, columnspacing=1.1,
                           labelcolor=_INK)  # fmt: skip
 
-    def _floor(self, panel: _Panel, canvas: raster.Canvas, y: float) -> None:
-        """A strip of floor that fades towards the eye and towards the distance."""
-        rise = (panel.top - (np.arange(panel.height) + 0.5) * panel.pixel - y) / _FLOOR_DEPTH
+    def _floor(self, panel: _Panel, canvas: raster.Canvas, low: float, high: float) -> None:
+        """A strip of floor between two heights that fades before and behind them."""
+        y = panel.top - (np.arange(panel.height) + 0.5) * panel.pixel
+        rise = (y - np.clip(y, low, high)) / _FLOOR_DEPTH
         canvas.rgba[..., 3] = 0.6 * np.clip(1.0 - rise**2, 0.0, 1.0)[:, None]
         canvas.rgba[..., :3] = canvas.rgba[..., 3:] * np.array(_FLOOR)
 
@@ -311,47 +352,6 @@ class _Panel:
             interpolation="nearest",
             zorder=above,
         )
-
-
-def spread(extents: FloatArray, overlap: float) -> FloatArray:
-    """How far to move figures to the right so that each stands clear of the one before.
-
-    Args:
-        extents: (n, 2) left and right edges, in the order of time.
-        overlap: Share of the narrower figure of two that may be covered.
-
-    Returns:
-        (n,) shifts, from 0, none smaller than the one before.
-    """
-    widths = extents[:, 1] - extents[:, 0]
-    shifts = np.zeros(len(extents))
-    for k in range(1, len(extents)):
-        covered = overlap * min(widths[k - 1], widths[k])
-        clear = extents[k - 1, 1] + shifts[k - 1] - covered - extents[k, 0]
-        shifts[k] = max(shifts[k - 1], clear)
-    return shifts
-
-
-def settle(anchors: FloatArray, widths: FloatArray) -> FloatArray:
-    """Centres of labels that do not overlap, as near to their anchors as can be (least squares).
-
-    Args:
-        anchors: (n,) where each label would be.
-        widths: (n,) of the labels, in the same unit; together at most 1.
-
-    Returns:
-        (n,) centres, within 0 to 1.
-    """
-    from scipy.optimize import isotonic_regression
-
-    order = np.argsort(anchors, kind="stable")
-    ordered = widths[order]
-    # Less the room of the labels before it, a label need only not be left of its neighbour.
-    room = np.cumsum(ordered) - 0.5 * ordered
-    free = isotonic_regression(anchors[order] - room).x
-    centers = np.empty_like(anchors)
-    centers[order] = np.clip(free, 0.0, max(1.0 - float(widths.sum()), 0.0)) + room
-    return centers
 
 
 def _line(figure: Figure, a: tuple[float, float], b: tuple[float, float]) -> Line2D:

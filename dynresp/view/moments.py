@@ -8,7 +8,7 @@ import numpy as np
 
 from dynresp.motion import rotations
 from dynresp.motion.rotations import FloatArray
-from dynresp.view.story import Event, PhaseName, Story
+from dynresp.view.story import PhaseName, Story, StoryEvent
 
 # Moments nearer to each other than this [s] become one.
 _MERGE_S = 0.07
@@ -48,15 +48,15 @@ def choose_moments(story: Story, count: int = 8) -> list[Moment]:
     events = sorted(story.events, key=lambda event: event.time_s)
     if not events:
         times = np.linspace(0.0, story.duration, count)
-        return _merged(story, [Event("", float(t)) for t in times])
+        return _merged(story, [StoryEvent("", float(t)) for t in times])
     first, last = events[0].time_s, events[-1].time_s
-    marks = [Event("", max(first - _LEAD_S, 0.0)), *events]
+    marks = [StoryEvent("", max(first - _LEAD_S, 0.0)), *events]
     wanted = max(count - len(_merged(story, marks)), 1)
-    marks += [Event("", float(t)) for t in np.linspace(last, story.duration, wanted + 1)[1:]]
+    marks += [StoryEvent("", float(t)) for t in np.linspace(last, story.duration, wanted + 1)[1:]]
     return _merged(story, marks)
 
 
-def _merged(story: Story, marks: list[Event]) -> list[Moment]:
+def _merged(story: Story, marks: list[StoryEvent]) -> list[Moment]:
     moments: list[Moment] = []
     for mark in marks:
         names = (mark.name,) if mark.name else ()

@@ -10,25 +10,28 @@ import numpy as np
 
 from dynresp.files import replacing
 from dynresp.motion import rotations
-from dynresp.view.shapes import BLOCK_COLOR, PATH_COLOR, mix
-from dynresp.view.story import Block, Story
+from dynresp.view.shapes import BLOCK_COLOR, BOUNDS_COLOR, CAPSULE_COLOR, PATH_COLORS, mix
+from dynresp.view.story import Block, MovingCapsule, Story, row_at
 
 _INK = (0.14, 0.15, 0.18)
 _FAINT_INK = (0.48, 0.51, 0.55)
-_OTHER_PATH = (0.25, 0.62, 0.45)
 _TRACK = (0.80, 0.30, 0.14)
 _DPI = 150
 # Longer side of the picture, and least shorter one [inch].
 _LONG, _SHORT = 10.0, 4.0
-# An arrow in this interval shows where the character faces [s], about as long [m].
-_ARROW_S, _ARROW_M = 1.0, 0.3
+# Heights of the heading and of the legend [inch].
+_HEADING, _LEGEND = 0.55, 0.35
+# An arrow in this interval shows where the character faces [s], but no more than so many, and each
+# as long as this share of the longer side.
+_ARROW_S, _MOST_ARROWS, _ARROW = 1.0, 80, 0.03
 
 
 def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> None:
     """Write the plan of a story as a PNG; the file is whole or not there.
 
-    It shows the ways drawn on the ground, the blocks, the way of the main character's pelvis with
-    arrows that show where it faces, second by second, its start and its end.
+    It shows the bounds of the world, the ways drawn on the ground, blocks and bars, the way of the
+    main character's pelvis with arrows that show where it faces, in a short walk second by second,
+    its start and its end.
 
     Args:
         story: What is shown.
@@ -44,11 +47,14 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
 
     track = story.motion.root_positions[:, :2]
     corners = [_corners(block) for block in story.blocks]
-    points = np.concatenate([track, *(line.points for line in story.paths), *corners])
+    bars = [bar for rod in story.capsules if (bar := _bar(rod)) is not None]
+    outline = [] if story.outline is None else [story.outline]
+    lines = [line.points for line in story.paths]
+    points = np.concatenate([track, *lines, *corners, *bars, *outline])
     low, high = points.min(axis=0) - 0.5, points.max(axis=0) + 0.5
     wide, deep = high - low
     scale = _LONG / max(wide, deep)
-    size = (max(_SHORT, wide * scale), max(_SHORT, deep * scale) + 0.6)
+    size = (max(_SHORT, wide * scale), max(_SHORT, deep * scale) + _HEADING + _LEGEND)
     figure = Figure(size, dpi=_DPI, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     axes.set_aspect("equal")
@@ -62,31 +68,46 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
     axes.set_xlabel("x [m]", fontsize=8, color=_FAINT_INK)
     axes.set_ylabel("y [m]", fontsize=8, color=_FAINT_INK)
     if corners:
-        # The higher a block the darker.
+        # The higher a block the darker, but light enough for the way that is drawn over it.
         highest = max(1e-6, *(block.top for block in story.blocks))
         tops = [max(block.top, 0.0) / highest for block in story.blocks]
-        shades = [mix(BLOCK_COLOR, (0, 0, 0), 0.4 * top) for top in tops]
+        light = mix(BLOCK_COLOR, (1.0, 1.0, 1.0), 0.75)
+        shades = [mix(light, BLOCK_COLOR, top) for top in tops]
         patches = PatchCollection([Polygon(c) for c in corners], facecolors=shades)
         patches.set_edgecolor((1.0, 1.0, 1.0, 0.5))
         patches.set_linewidth(0.4)
         axes.add_collection(patches)
-    for line, color in zip(story.paths, itertools.cycle((PATH_COLOR, _OTHER_PATH)), strict=False):
+    for number, bar in enumerate(bars):
+        axes.plot(*bar.T, color=CAPSULE_COLOR, lw=3.0, alpha=0.6, solid_capstyle="round",
+                  label="bars" if number == 0 else None)  # fmt: skip
+    for points in outline:
+        axes.plot(*points.T, color=BOUNDS_COLOR, lw=2.5, label="bounds")
+    for line, color in zip(story.paths, itertools.cycle(PATH_COLORS), strict=False):
         axes.plot(*line.points.T, color=color, lw=3.5, alpha=0.45, label=line.name,
                   solid_capstyle="round")  # fmt: skip
     axes.plot(*track.T, color=_TRACK, lw=1.3, label="pelvis")
-    step = max(1, round(_ARROW_S * story.motion.fps))
+    apart = max(_ARROW_S, story.duration / _MOST_ARROWS)
+    step = max(1, round(apart * story.motion.fps))
     yaws = np.asarray(rotations.yaw_of(story.motion.root_quaternions[::step]))
     axes.quiver(*track[::step].T, np.cos(yaws), np.sin(yaws), angles="xy", scale_units="xy",
-                scale=1.0 / _ARROW_M, width=0.0022, color=_INK, zorder=3)  # fmt: skip
+                scale=1.0 / (_ARROW * max(wide, deep)), width=0.0022, color=_INK,
+                zorder=3)  # fmt: skip
     if len(marks):
         at = track[[story.frame_at(float(mark)) for mark in marks]]
         axes.plot(*at.T, ls="", marker="o", ms=2.2, color=_INK, alpha=0.5, label="jump")
     axes.plot(*track[0], ls="", marker="o", ms=7, mfc="white", mec=_TRACK, mew=1.5, label="start")
     axes.plot(*track[-1], ls="", marker="s", ms=7, color=_TRACK, label="end")
-    figure.suptitle(story.title, x=0.02, ha="left", fontsize=11, fontweight="bold", color=_INK,
-                    parse_math=False)  # fmt: skip
-    axes.set_title(story.subtitle, loc="left", fontsize=8.5, color=_FAINT_INK, parse_math=False)
-    figure.legend(loc="outside lower right", ncols=6, frameon=False, fontsize=8, labelcolor=_INK)
+    side = 0.12 / size[0]
+    figure.text(side, 1 - 0.1 / size[1], story.title, va="top", fontweight="bold", color=_INK,
+                fontsize=11, parse_math=False)  # fmt: skip
+    figure.text(side, 1 - 0.32 / size[1], story.subtitle, va="top", fontsize=8.5,
+                color=_FAINT_INK, parse_math=False)  # fmt: skip
+    figure.legend(loc="lower right", ncols=8, frameon=False, fontsize=8, labelcolor=_INK,
+                  borderaxespad=0.3, columnspacing=1.4, handlelength=1.6)  # fmt: skip
+    engine = figure.get_layout_engine()
+    assert engine is not None
+    low, free = _LEGEND / size[1], 1.0 - (_HEADING + _LEGEND) / size[1]
+    engine.set(rect=(0.0, low, 1.0, free))  # type: ignore[call-arg]
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png")
 
@@ -97,3 +118,12 @@ def _corners(block: Block) -> np.ndarray:
     turn = rotations.from_yaw(block.yaw)
     local = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
     return rotations.rotate(turn, local)[:, :2] + np.array(block.center[:2])
+
+
+def _bar(rod: MovingCapsule) -> np.ndarray | None:
+    """(2, 2) the ends of a capsule on the ground as it is at first; None if it is not there."""
+    at = row_at(rod.positions, 0)
+    if at is None:
+        return None
+    along = rotations.rotate(rod.quaternions[0], np.array([0.0, 0.0, rod.half_length]))
+    return np.stack([at - along, at + along])[:, :2]

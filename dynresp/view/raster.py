@@ -118,7 +118,13 @@ class Canvas:
         return out
 
 
-def draw(meshes: Sequence[Mesh], view: Projection, pixel: float, samples: int = 2) -> Layer:
+def draw(
+    meshes: Sequence[Mesh],
+    view: Projection,
+    pixel: float,
+    samples: int = 2,
+    canvas: Canvas | None = None,
+) -> Layer:
     """Draw solids, the nearer before the farther, shaded, on nothing.
 
     Args:
@@ -126,12 +132,19 @@ def draw(meshes: Sequence[Mesh], view: Projection, pixel: float, samples: int = 
         view: The camera.
         pixel: Size of a pixel [m].
         samples: Rays across a pixel; more make smoother edges.
+        canvas: What it will be laid on, unmoved: nothing is drawn outside of it, however far the
+            solids reach.
 
     Returns:
         A layer just large enough.
     """
     scene = _Triangles.of(meshes, view)
     corner, (width, height) = _grid(scene.corners[..., :2], pixel)
+    if canvas is not None:
+        rows, columns = canvas.rgba.shape[:2]
+        first = np.maximum(corner, (canvas.left, canvas.top - rows))
+        last = np.minimum(corner + np.array([width, height]), (canvas.left + columns, canvas.top))
+        corner, (width, height) = first, np.maximum(last - first, 0).astype(int).tolist()
     low, step = corner * pixel, pixel / samples
     shape = (height * samples, width * samples)
     triangle, column, row = _cover(scene.corners[..., :2], low, step, shape)

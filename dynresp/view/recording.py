@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import html
 import io
+import itertools
 import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,6 +37,9 @@ _ALONE = (
     '<meta http-equiv="Content-Security-Policy" '
     "content=\"default-src data: blob: 'unsafe-inline' 'unsafe-eval'\">"
 )
+
+# So many events are named in the heading.
+_MOST_EVENTS = 6
 
 # Lines on the ground are drawn this high above it [m], else the floor flickers through.
 _ABOVE_FLOOR = 0.004
@@ -130,20 +134,23 @@ class _Scene:
         for i, rod in enumerate(story.capsules):
             mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
             self._things.append((rod, self._add_mesh(f"/limb/{i}_{rod.name}", mesh)))
-        for i, mesh in enumerate(self.cast.blocks()):
+        for i, mesh in enumerate((*self.cast.blocks(), *self.cast.edge())):
             self._add_mesh(f"/block/{i}", mesh)
-        for i, path in enumerate(story.paths):
+        colors = itertools.cycle(shapes.PATH_COLORS)
+        for i, (path, color) in enumerate(zip(story.paths, colors, strict=False)):
             points = np.column_stack([path.points, np.full(len(path.points), _ABOVE_FLOOR)])
             self.scene.add_line_segments(
                 f"/path/{i}_{path.name}",
                 np.stack([points[:-1], points[1:]], axis=1).astype(np.float32),
-                colors=_bytes(shapes.PATH_COLOR),
+                colors=_bytes(color),
                 thickness=3.0,
                 thickness_units="screen",
             )
         self._label = self.scene.add_label(
             "/phase", " ", anchor="bottom-center", font_size_mode="screen", font_screen_scale=1.1
         )
+        # Without words it would be an empty box above the head.
+        self._label.visible = False
         self._phase: PhaseName | None = None
 
     def play(self, recorder: Any) -> None:
@@ -178,6 +185,7 @@ class _Scene:
             return
         self._phase = phase
         self._label.text = phase or " "
+        self._label.visible = phase is not None
         colors = shapes.phase_colors(self.cast.solids, phase, self.config.dye)
         for (_, handle), color in zip(self._character, colors, strict=True):
             handle.color = _bytes(color)
@@ -236,10 +244,11 @@ def _with_heading(page: str, story: Story) -> str:
         f"&#9679;</span> {name}</span>"
         for name in shown
     )
+    told = sorted(story.events, key=lambda event: event.time_s)
+    more = len(told) - _MOST_EVENTS
     events = " &middot; ".join(
-        f"{event.time_s:.2f} s {html.escape(event.name)}"
-        for event in sorted(story.events, key=lambda event: event.time_s)
-    )
+        f"{event.time_s:.2f} s {html.escape(event.name)}" for event in told[:_MOST_EVENTS]
+    ) + (f" and {more} more" if more > 0 else "")
     lines = [
         f'<div style="font-size:17px;font-weight:600">{html.escape(story.title)}</div>',
         f'<div style="color:#667">{html.escape(story.subtitle)}</div>' if story.subtitle else "",
@@ -248,7 +257,7 @@ def _with_heading(page: str, story: Story) -> str:
     ]
     heading = (
         '<div style="position:fixed;top:12px;right:16px;z-index:3;pointer-events:none;'
-        "text-align:right;font:13px/1.5 system-ui,sans-serif;color:#223;"
+        "text-align:right;max-width:55vw;font:13px/1.5 system-ui,sans-serif;color:#223;"
         "text-shadow:0 0 4px #fff,0 0 4px #fff"
         f'">{"".join(lines)}</div>'
     )

@@ -9,6 +9,7 @@ centimetre; the fillers are for the eye alone. Colours are those of the model fi
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
@@ -36,7 +37,9 @@ PHASE_COLORS: dict[PhaseName, Color] = {
 BALL_COLOR: Color = (0.85, 0.33, 0.10)
 CAPSULE_COLOR: Color = (0.35, 0.30, 0.38)
 BLOCK_COLOR: Color = (0.72, 0.62, 0.48)
-PATH_COLOR: Color = (0.16, 0.42, 0.70)
+PATH_COLORS: tuple[Color, ...] = ((0.16, 0.42, 0.70), (0.25, 0.62, 0.45))
+"""Of what is drawn on the ground, one after the other; then again from the first."""
+BOUNDS_COLOR: Color = (0.55, 0.46, 0.34)
 # Shirts of the further characters.
 _OTHER_SHIRTS: tuple[Color, ...] = ((0.55, 0.30, 0.48), (0.42, 0.50, 0.25), (0.62, 0.45, 0.22))
 
@@ -62,6 +65,7 @@ _FILLERS: tuple[tuple[str, tuple[float, float, float], float], ...] = (
 )
 # Geoms with a skin of their own beside the rest of their body, in which a joint would be lost.
 _APART = ("neck", "left_hand", "right_hand")
+_UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 # Radius of the edges of boxes [m].
 _ROUNDING = 0.008
 
@@ -215,6 +219,36 @@ def box(half_sizes: Sequence[float], color: Color) -> Mesh:
             normals += [normal] * 4
             faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     return Mesh(np.array(vertices), np.array(normals), np.array(faces), color)
+
+
+def ribbon(points: FloatArray, width: float, height: float, color: Color) -> Mesh:
+    """A band that lies on the ground along a line, of one flat bar for each of its stretches.
+
+    Args:
+        points: (n, 2) corners of the line [m]; those at one place with their neighbour do nothing.
+        width: Of the band [m].
+        height: How high it stands above the ground [m].
+        color: Of the whole.
+    """
+    bars: list[Mesh] = []
+    for a, b in itertools.pairwise(points):
+        length = float(np.linalg.norm(b - a))
+        if length > 0.0:
+            # Half a width longer at both ends: no gaps at the corners.
+            half = (0.5 * (length + width), 0.5 * width, 0.5 * height)
+            middle = np.array([*(0.5 * (a + b)), 0.5 * height])
+            yaw = float(np.arctan2(b[1] - a[1], b[0] - a[0]))
+            bars.append(box(half, color).placed(middle, rotations.from_yaw(yaw)))
+    if not bars:
+        middle = np.array([*points[0], 0.5 * height])
+        bars.append(box([0.5 * width, 0.5 * width, 0.5 * height], color).placed(middle, _UPRIGHT))
+    starts = np.cumsum([0, *(len(bar.vertices) for bar in bars[:-1])])
+    return Mesh(
+        np.concatenate([bar.vertices for bar in bars]),
+        np.concatenate([bar.normals for bar in bars]),
+        np.concatenate([bar.faces + start for bar, start in zip(bars, starts, strict=True)]),
+        color,
+    )
 
 
 def hull(balls: Sequence[tuple[FloatArray, float]], color: Color, detail: int = 2) -> Mesh:

@@ -142,7 +142,7 @@ class GroundPath:
 
 
 @dataclass(frozen=True)
-class Event:
+class StoryEvent:
     """Something that happens at one moment.
 
     Attributes:
@@ -155,7 +155,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Phase:
+class StoryPhase:
     """A stretch of the story in which one thing drives the character.
 
     Attributes:
@@ -194,6 +194,7 @@ class Story:
         others: Further characters, at the frame rate of `motion`; each holds its last pose.
         blocks: What stands about.
         paths: What is drawn on the ground.
+        bounds: How far one can go, (x, y, x, y) of two corners [m]; None where there is no bound.
         events: Moments with names.
         phases: What drives the main character when; where they overlap, the later one counts.
         title: First line, for people.
@@ -209,8 +210,9 @@ class Story:
     others: Sequence[Motion] = ()
     blocks: Sequence[Block] = ()
     paths: Sequence[GroundPath] = ()
-    events: Sequence[Event] = ()
-    phases: Sequence[Phase] = ()
+    bounds: tuple[float, float, float, float] | None = None
+    events: Sequence[StoryEvent] = ()
+    phases: Sequence[StoryPhase] = ()
     title: str = ""
     subtitle: str = ""
     times: FloatArray = field(init=False, repr=False)
@@ -237,6 +239,14 @@ class Story:
         times = np.arange(len(self.motion)) / self.motion.fps
         times.flags.writeable = False
         object.__setattr__(self, "times", times)
+
+    @property
+    def outline(self) -> FloatArray | None:
+        """(5, 2) the corners of the bounds [m], the first also at the end; None without bounds."""
+        if self.bounds is None:
+            return None
+        a, b, c, d = self.bounds
+        return np.array([[a, b], [c, b], [c, d], [a, d], [a, b]])
 
     @property
     def duration(self) -> float:

@@ -253,7 +253,7 @@ def _script(
     for rod in story.capsules:
         mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
         actors.add(mesh, rod.positions, rod.quaternions)
-    for mesh in cast.blocks():
+    for mesh in (*cast.blocks(), *cast.lines(), *cast.edge()):
         actors.add(mesh, np.zeros((len(story.motion), 3)))
     return {
         **actors.arrays(),

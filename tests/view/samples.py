@@ -7,7 +7,7 @@ import numpy as np
 from dynresp.motion import rotations
 from dynresp.motion.character import default_character
 from dynresp.motion.motion import Motion
-from dynresp.view.story import Event, MovingSphere, Phase, Story
+from dynresp.view.story import MovingSphere, Story, StoryEvent, StoryPhase
 
 FPS = 30.0
 
@@ -36,13 +36,14 @@ def story_of(motion: Motion, **parts: object) -> Story:
     given: dict[str, object] = {
         "spheres": [MovingSphere("ball", 0.12, way)],
         "events": [
-            Event(name, t) for name, t in zip(("contact", "exit", "entry"), times[:3], strict=True)
+            StoryEvent(name, t)
+            for name, t in zip(("contact", "exit", "entry"), times[:3], strict=True)
         ],
         "phases": [
-            Phase("base motion", 0.0, times[0]),
-            Phase("physics", times[0], times[1]),
-            Phase("blend", times[1], times[2]),
-            Phase("reaction", times[2], times[3]),
+            StoryPhase("base motion", 0.0, times[0]),
+            StoryPhase("physics", times[0], times[1]),
+            StoryPhase("blend", times[1], times[2]),
+            StoryPhase("reaction", times[2], times[3]),
         ],
         "title": "a <ball> & a walk",
         "subtitle": "made for a test",

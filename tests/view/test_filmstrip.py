@@ -10,8 +10,8 @@ import pytest
 
 from dynresp.errors import DynrespError
 from dynresp.motion.motion import Motion
-from dynresp.view.filmstrip import FilmstripConfig, settle, spread, write_filmstrip
-from dynresp.view.story import Event, Story
+from dynresp.view.filmstrip import FilmstripConfig, write_filmstrip
+from dynresp.view.story import Block, GroundPath, MovingCapsule, Story, StoryEvent
 from tests.view.samples import story_of, striding
 
 SMALL = FilmstripConfig(width_px=700, moments=5)
@@ -67,30 +67,39 @@ def test_a_place_that_cannot_be_written(tmp_path: Path, story: Story) -> None:
         write_filmstrip(story, tmp_path / "file" / "x.png", SMALL)
 
 
-def test_spread_moves_only_to_the_right_and_clears() -> None:
-    extents = np.array([[0.0, 1.0], [0.2, 1.4], [-1.0, 0.0], [9.0, 9.5]])
-    shifts = spread(extents, 0.1)
-    assert shifts[0] == 0
-    assert (np.diff(shifts) >= 0).all()
-    moved = extents + shifts[:, None]
-    widths = np.diff(extents, axis=1)[:, 0]
-    covered = moved[:-1, 1] - moved[1:, 0]
-    assert (covered <= 0.1 * np.minimum(widths[1:], widths[:-1]) + 1e-12).all()
-    np.testing.assert_array_equal(spread(extents[[0, 3]], 0.1), 0.0)
+def test_a_very_long_way_is_shown_twice(tmp_path: Path) -> None:
+    # Side by side the figures stay as large as they are on a short way.
+    for name, frames in (("short", 90), ("long", 900)):
+        walker = story_of(striding(frames, 4.0), events=[], phases=[], spheres=[])
+        write_filmstrip(walker, tmp_path / f"{name}.png", SMALL)
+    short, long = (shirt_rows(tmp_path / f"{name}.png") for name in ("short", "long"))
+    assert long > short
 
 
-def test_labels_settle_without_overlap() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        anchors, widths = rng.uniform(0, 1, 9), rng.uniform(0.02, 0.1, 9)
-        centers = settle(anchors, widths)
-        order = np.argsort(anchors)
-        gaps = np.diff(centers[order]) - 0.5 * (widths[order][1:] + widths[order][:-1])
-        assert (gaps >= -1e-12).all()
-        assert (centers - widths / 2 >= -1e-12).all()
-        assert (centers + widths / 2 <= 1 + 1e-12).all()
-    roomy = np.array([0.2, 0.8, 0.5])
-    np.testing.assert_allclose(settle(roomy, np.full(3, 0.1)), roomy)
+def shirt_rows(file: Path) -> int:
+    """How many rows of a picture a shirt is in, of the picture's longest such run."""
+    picture = matplotlib.image.imread(file)[..., :3]
+    blue = (picture[..., 2] > picture[..., 0] + 0.2).any(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], blue, [0]]).astype(int)))
+    return int((edges[1::2] - edges[::2]).max())
+
+
+def test_what_stands_is_in_the_lower_picture_and_the_picture_stays_small(tmp_path: Path) -> None:
+    motion = striding(90, 0.0)
+    alone = story_of(motion, events=[], phases=[], spheres=[])
+    write_filmstrip(alone, tmp_path / "alone.png", SMALL)
+    # A wall far away, a bar above, and a world so large that no picture could hold it.
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (90, 1))
+    among = story_of(
+        motion, events=[], phases=[], spheres=[],
+        blocks=[Block((0.0, 3.0, 0.5), (2.0, 0.1, 0.5)), Block((190.0, 0.0, 1.0), (1.0, 1.0, 1.0))],
+        capsules=[MovingCapsule("bar", 0.02, 0.3, np.tile([0.0, 0.0, 2.6], (90, 1)), upright)],
+        paths=[GroundPath("way", np.array([[-1.0, 0.5], [2.0, 0.5]]))],
+        bounds=(-200.0, -200.0, 200.0, 200.0),
+    )  # fmt: skip
+    write_filmstrip(among, tmp_path / "among.png", SMALL)
+    before, after = (matplotlib.image.imread(tmp_path / f"{n}.png") for n in ("alone", "among"))
+    assert before.shape[0] < after.shape[0] < 3 * before.shape[0]
 
 
 def test_importing_the_views_imports_nothing_heavy() -> None:
@@ -114,6 +123,6 @@ def test_numbers_stay_finite_for_a_figure_lying_down(tmp_path: Path) -> None:
 
 def test_dollar_signs_are_no_mathematics(tmp_path: Path) -> None:
     text = "price $\\foo{$ up"
-    told = story_of(striding(30, 1.3), title=text, subtitle=text, events=[Event(text, 0.3)])
+    told = story_of(striding(30, 1.3), title=text, subtitle=text, events=[StoryEvent(text, 0.3)])
     write_filmstrip(told, tmp_path / "a.png", SMALL)
     assert (tmp_path / "a.png").exists()

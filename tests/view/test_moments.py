@@ -5,7 +5,7 @@ import pytest
 
 from dynresp.view.moments import camera_yaw, choose_moments, main_direction
 from dynresp.view.raster import Projection
-from dynresp.view.story import Event, Story
+from dynresp.view.story import Story, StoryEvent
 from tests.view.samples import FPS, story_of, striding
 
 
@@ -22,7 +22,7 @@ def test_every_event_and_both_sides(story: Story) -> None:
 
 
 def test_events_that_fall_together_share_a_moment() -> None:
-    events = [Event("contact", 0.5), Event("exit", 0.52), Event("entry", 0.9)]
+    events = [StoryEvent("contact", 0.5), StoryEvent("exit", 0.52), StoryEvent("entry", 0.9)]
     moments = choose_moments(story_of(striding(40, 1.0), events=events, phases=[]), 6)
     assert ("contact", "exit") in [moment.events for moment in moments]
     assert [m.time_s for m in moments if m.events == ("contact", "exit")] == [0.5]

@@ -11,7 +11,7 @@ import pytest
 
 from dynresp.errors import DynrespError
 from dynresp.view.recording import write_recording
-from dynresp.view.story import Story
+from dynresp.view.story import Story, StoryEvent
 from tests.view.samples import striding
 
 
@@ -33,6 +33,14 @@ def test_a_page_that_needs_nothing_else(
     assert "a &lt;ball&gt; &amp; a walk" in page
     assert "a <ball>" not in page
     assert "0.33 s contact" in page
+
+
+def test_many_events_are_counted_in_the_heading(tmp_path: Path) -> None:
+    events = [StoryEvent("contact", 0.1 * number) for number in range(9)]
+    write_recording(Story(striding(40, 1.0), events=events), tmp_path / "a.html")
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert page.count(" s contact") == 6
+    assert " and 3 more</div>" in page
 
 
 def test_a_second_character_and_an_arm(tmp_path: Path, crowded_story: Story) -> None:

@@ -67,3 +67,17 @@ def test_only_clothes_are_dyed() -> None:
     for solid, color in zip(solids, dyed, strict=True):
         changed = color != solid.mesh.color
         assert changed == (solid.part in ("shirt", "trousers")), solid.name
+
+
+def test_a_ribbon_lies_along_its_line() -> None:
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
+    mesh = shapes.ribbon(points, 0.1, 0.02, (0.0, 0.0, 1.0))
+    np.testing.assert_allclose(mesh.vertices.min(axis=0), [-0.05, -0.05, 0.0], atol=1e-12)
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), [2.05, 1.05, 0.02], atol=1e-12)
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    outward = np.sum(np.cross(b - a, c - a) * mesh.normals[mesh.faces[:, 0]], axis=1)
+    assert (outward > 0).all()
+    assert len(mesh.faces) == 2 * 12
+    # A line that goes nowhere is a dot.
+    dot = shapes.ribbon(points[1:3], 0.1, 0.02, (0.0, 0.0, 1.0))
+    np.testing.assert_allclose(np.ptp(dot.vertices, axis=0), [0.1, 0.1, 0.02], atol=1e-12)

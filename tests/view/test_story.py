@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dynresp.errors import MotionError, UnknownNameError
-from dynresp.view.story import Event, MovingCapsule, MovingSphere, Phase, Story, row_at
+from dynresp.view.story import MovingCapsule, MovingSphere, Story, StoryEvent, StoryPhase, row_at
 from tests.view.samples import FPS, striding
 
 
@@ -14,14 +14,14 @@ def test_phase_at_each_time(story: Story) -> None:
 
 
 def test_no_phase_where_the_story_does_not_say() -> None:
-    story = Story(striding(10, 1.0), phases=[Phase("physics", 0.1, 0.2)])
+    story = Story(striding(10, 1.0), phases=[StoryPhase("physics", 0.1, 0.2)])
     assert story.phase_at(0.0) is None
     assert story.phase_at(0.15) == "physics"
     assert story.phase_at(0.3) is None
 
 
 def test_where_phases_overlap_the_later_one_counts() -> None:
-    phases = [Phase("base motion", 0.0, 0.3), Phase("physics", 0.1, 0.2)]
+    phases = [StoryPhase("base motion", 0.0, 0.3), StoryPhase("physics", 0.1, 0.2)]
     story = Story(striding(10, 1.0), phases=phases)
     assert [story.phase_at(t) for t in (0.05, 0.15, 0.25)] == [
         "base motion",
@@ -32,9 +32,9 @@ def test_where_phases_overlap_the_later_one_counts() -> None:
 
 def test_a_phase_has_one_of_four_names() -> None:
     with pytest.raises(UnknownNameError, match=r"'blending'.*Did you mean 'blend'"):
-        Phase("blending", 0.0, 1.0)  # type: ignore[arg-type]
+        StoryPhase("blending", 0.0, 1.0)  # type: ignore[arg-type]
     with pytest.raises(MotionError, match="before it begins"):
-        Phase("blend", 1.0, 0.5)
+        StoryPhase("blend", 1.0, 0.5)
 
 
 def test_absent_rows(story: Story) -> None:
@@ -72,4 +72,4 @@ def test_one_clock() -> None:
     with pytest.raises(MotionError, match="resampled"):
         Story(motion, others=[motion.resampled(60.0)])
     with pytest.raises(MotionError, match="outside the story"):
-        Story(motion, events=[Event("contact", 2.0)])
+        Story(motion, events=[StoryEvent("contact", 2.0)])
