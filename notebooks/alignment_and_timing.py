@@ -19,14 +19,14 @@
 # table 1 and figure 2, on this machine.
 
 # %%
-import math
 import time
 from dataclasses import replace
 
+import alignment_pictures as pictures
 import numpy as np
 import study
 from matplotlib import pyplot as plt
-from study import BLUE, GREEN, GREY, INK, ORANGE, RED, percent, table
+from study import percent, table, words
 
 from dynresp.bench import align as bench_align
 from dynresp.bench import respond as bench_respond
@@ -47,10 +47,6 @@ config, window = here.config, here.config.window
 classes = data.facts.classes
 print(machine_line(describe_machine()))
 print(f"library {here.library.name!r}, {len(here.library.reactions)} reactions")
-
-
-def words(name: str) -> str:
-    return name.replace("_mirrored", ", mirrored").replace("_", " ")
 
 
 # %% [markdown]
@@ -78,28 +74,14 @@ responses = Responder(here.character, here.library, config, 1).respond(
 tracks = reaction_tracks(here.character, here.library, config)
 fps = config.physics.fps
 
-
-def spaced(first, last, step):
-    """Frames from first to last, none further from the next than a step."""
-    return np.linspace(first, last, math.ceil((last - first) / step) + 1)
-
-
 fig = plt.figure(figsize=(13, 8.2))
 grid = fig.add_gridspec(2, 3, height_ratios=(1.1, 1))
 for column, response in enumerate(responses):
     found = landscape(response, here.character, config)
     trace = response.looked_ahead.centers, response.looked_ahead.quaternions
-    space = fig.add_subplot(grid[0, column], projection="3d")
-    x, y = np.meshgrid(found.entries_s, found.exits_s)
-    space.plot_surface(x, y, found.errors, cmap="viridis_r", rcount=40, ccount=40, linewidth=0)
-    space.set(
-        xlabel="entry [s]",
-        ylabel="exit [s]",
-        zlabel="window error [m]",
-        title=words(response.choice),
+    pictures.landscape_in_space(
+        fig.add_subplot(grid[0, column], projection="3d"), found, words(response.choice)
     )
-    space.view_init(elev=30, azim=-60)
-    space.set_box_aspect(None, zoom=0.88)
 
     path, settings = [], AlignmentConfig()
     for steps in range(settings.most_iterations):
@@ -107,25 +89,10 @@ for column, response in enumerate(responses):
         (at,) = Aligner(tracks, window, own).align(*trace, [response.choice])
         if not path or (at.exit_frame, at.entry_frame) != path[-1]:
             path.append((at.exit_frame, at.entry_frame))
-    exits, entries = np.array(path).T / fps
-    step = settings.step_s * fps
     first, last = entry_range(len(response.entered.poses), config)
-    rows = spaced(window.exit_frames[0], window.exit_frames[-1], step) / fps
-    columns = spaced(first, last - 1, step) / fps
-
+    sampled = pictures.Sampled.of(window.exit_frames, (first, last - 1), settings.step_s, fps)
     ax = fig.add_subplot(grid[1, column])
-    image = ax.pcolormesh(
-        found.entries_s, found.exits_s, found.errors, cmap="viridis_r", shading="nearest"
-    )
-    for k, row in enumerate(rows):
-        seen = {"mfc": "white", "mec": INK} if k < at.sets else {"mfc": "none", "mec": "white"}
-        ax.plot(columns, np.full(len(columns), row), "o", ms=5, mew=0.8, clip_on=False, **seen)
-    ax.plot(entries, exits, "-", color=RED, lw=1.6)
-    ax.plot(entries[0], exits[0], "o", color="white", mec=RED, mew=1.6, ms=7, clip_on=False)
-    ax.plot(entries[-1], exits[-1], "o", color=RED, mec="white", mew=1.0, ms=8, clip_on=False)
-    ax.set(xlabel="entry: time in the reaction [s]", ylabel="exit: time after contact [s]",
-           title=f"{at.error:.3f} m after {at.evaluations} errors, {found.errors.min():.3f} m of {found.errors.size}")  # fmt: skip
-    fig.colorbar(image, ax=ax, pad=0.02)
+    pictures.way_down(ax, found, sampled, np.array(path) / fps, at)
 plt.show()
 
 # %% [markdown]
@@ -174,32 +141,7 @@ table(
 )  # fmt: skip
 
 # %%
-fig, ax = plt.subplots(figsize=(7.5, 3.8))
-for refine, colour, label, side in (
-    (False, GREY, "best sample", -15),
-    (True, GREEN, "with BFGS", 8),
-):
-    own = {name: r for (name, other), r in measured.items() if other == refine}
-    own = {
-        name.partition(",")[0]: r
-        for name, r in own.items()
-        if name.count(",") == 0 or "paper" in name
-    }
-    near = [100 * r.more["within_2_percent"] for r in own.values()]
-    ax.plot([r.value for r in own.values()], near, "o-", ms=8, lw=1, color=colour, label=label)
-    for (name, r), share in zip(own.items(), near, strict=True):
-        ax.annotate(
-            name,
-            (r.value, share),
-            xytext=(0, side),
-            textcoords="offset points",
-            ha="center",
-            fontsize=8.5,
-        )
-ax.axhline(95, color=INK, lw=0.8, ls=":")
-ax.set(ylim=(None, 108), xlabel="time of one alignment [us]", ylabel="within 2 % of the exhaustive error [%]",
-       title="Alignment: quality against speed, by the distance of the samples")  # fmt: skip
-ax.legend(loc="lower right")
+pictures.quality_against_speed(measured)
 plt.show()
 
 # %% [markdown]
@@ -278,29 +220,7 @@ table(
 )
 
 # %%
-fig, ax = plt.subplots(figsize=(8.5, 3.8))
-for (name, (ms, regret)), colour, marker in zip(
-    points.items(), (GREEN, GREEN, BLUE, BLUE, ORANGE, RED, INK), "oossDoX", strict=True
-):
-    ax.plot(
-        ms,
-        regret,
-        marker,
-        ms=10,
-        color=colour,
-        mfc="white" if "reduced" in name else colour,
-        label=name,
-        ls="",
-    )
-ax.set(
-    xlim=(0, None),
-    ylim=(0, None),
-    xlabel="time of a choice, median [ms]",
-    ylabel="mean regret [%]",
-    title="Regret against budget",
-)
-ax.set(xlim=(0, 1.1 * ax.get_xlim()[1]), ylim=(-0.02 * ax.get_ylim()[1], 1.1 * ax.get_ylim()[1]))
-ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+pictures.regret_against_budget(points)
 plt.show()
 
 # %% [markdown]
@@ -395,18 +315,5 @@ print(
 )
 
 # %%
-COLOURS = {"physics": GREY, "bodies": "#5f6770", "choice": GREEN, "oracle": ORANGE, "rewind": RED}
-fig, ax = plt.subplots(figsize=(10, 2.8))
-for row, own in enumerate(STAGES.values()):
-    left = 0.0
-    for name in own:
-        ax.barh(row, stages[name], left=left, color=COLOURS[name], height=0.6)
-        left += stages[name]
-    ax.text(left, row, f"  {left:.1f} ms", va="center", fontsize=9)
-for name, colour in COLOURS.items():
-    ax.barh(0, 0, color=colour, label=name)
-ax.set_yticks(range(len(STAGES)), STAGES)
-ax.set(xlabel="time in the frame of the hit [ms]", title="Stages of a response, by budget")
-ax.margins(x=0.08)
-ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+pictures.stages(stages, STAGES)
 plt.show()

@@ -18,10 +18,11 @@
 # the first tenths of a second (Zordan et al. 2007, sections 4 and 7)? And what explains where our figures differ from the paper's?
 
 # %%
+import classifier_pictures as pictures
 import numpy as np
 import study
 from matplotlib import pyplot as plt
-from study import BLUE, GREEN, GREY, INK, ORANGE, RED, percent, table
+from study import BLUE, GREEN, GREY, RED, percent, table, words
 
 from dynresp.learning.baselines import nearest_neighbours
 from dynresp.learning.evaluate import evaluate
@@ -58,32 +59,12 @@ print(
 )
 print(f"near ties among the throws that are answered with a reaction: {percent(ties.mean())}")
 
-
-def words(name: str) -> str:
-    return name.replace("_mirrored", ", mirrored").replace("_", " ")
-
-
-COLOURS = {
-    "step_forward_small": "#98d594",
-    "step_forward_large": "#1f8a4c",
-    "multiple_steps_forward": "#d0b400",
-    "forward_roll": "#5a4a00",
-    "side_fall": "#ee7a2b",
-    "step_backward_small": "#86c5ec",
-    "step_backward_large": "#1f5fb0",
-    "multiple_steps_backward": "#00b2b0",
-    "backward_roll": "#8544b0",
-    "upper_body_front": "#f48fc0",
-    "upper_body_side": "#000000",
-    "upper_body_back": "#cc2f3a",
-    "carry_on": "#c9ced4",
-}
 fig, ax = plt.subplots(figsize=(8, 3.8))
 order = np.argsort(shares)
 ax.barh(
     [words(strategies[k]) for k in order],
     shares[order],
-    color=[COLOURS[strategies[k]] for k in order],
+    color=[pictures.COLOURS[strategies[k]] for k in order],
 )
 for row, k in enumerate(order):
     ax.text(shares[k], row, f" {percent(shares[k], 2)}", va="center", fontsize=9)
@@ -106,36 +87,12 @@ PAIRS = (
     ("0.1/com/velocity_x", "0.1/com/velocity_z"),
     ("0.3/left_foot/position_x", "0.3/right_foot/position_x"),
 )
-UNITS = {"position": "m", "orientation": "rad", "velocity": "m/s"}
-
-
-def axis_label(name: str) -> str:
-    time_s, body, state = name.split("/")
-    quantity, _, axis = state.rpartition("_")
-    about = {"com": "centre of mass"}.get(body, body.replace("_", " "))
-    return f"{about}, {quantity} {axis} at {time_s} s [{UNITS[quantity]}]"
-
-
 whole = data.take(np.isfinite(data.features).all(axis=1))
 some = np.random.default_rng(0).permutation(len(whole))[:4000]
 told = np.array([strategies.index(name) for name in facts.strategies])[whole.label[some]]
-fig, axes = plt.subplots(2, 3, figsize=(12.5, 8.2))
-for ax, pair in zip(axes.flat, PAIRS, strict=True):
-    x, y = (whole.features[some, facts.feature_names.index(name)] for name in pair)
-    # The most frequent first, so that the rare lie on top.
-    for k in np.argsort(-shares):
-        rows = told == k
-        if rows.any():
-            ax.plot(x[rows], y[rows], ".", ms=3.2 if k != strategies.index("carry_on") else 2.2,
-                    color=COLOURS[strategies[k]], label=words(strategies[k]), rasterized=True)  # fmt: skip
-    ax.set(
-        xlabel=axis_label(pair[0]),
-        ylabel=axis_label(pair[1]),
-        xlim=np.percentile(x, [0.3, 99.7]),
-        ylim=np.percentile(y, [0.3, 99.7]),
-    )
-handles, names = axes[0, 0].get_legend_handles_labels()
-fig.legend(handles, names, loc="outside lower center", ncols=5, markerscale=4, handletextpad=0.2)
+pictures.pairs_of_features(
+    whole.features[some], facts.feature_names, PAIRS, strategies, told, shares
+)
 plt.show()
 
 # %% [markdown]
@@ -212,34 +169,7 @@ table(
 )  # fmt: skip
 
 # %%
-LINES = dict(zip(VECTORS, (GREEN, BLUE, ORANGE), strict=True))
-fig, axes = plt.subplots(1, 3, figsize=(14, 4.6))
-left, middle, right = axes
-for name, colour in LINES.items():
-    sizes = [size for own, size in curve if own == name]
-    got = [curve[name, size] for size in sizes]
-    for ax, how in ((left, "alone"), (middle, "in use")):
-        ax.plot(sizes, [f[how].accuracy for f in got], "o-", color=colour, label=name)
-        ax.plot(sizes, [f[how, "mirrors as one"] for f in got], "o--", color=colour, mfc="white")
-    right.plot(sizes, [100 * f["in use"].regret for f in got], "o-", color=colour, label=name)
-    right.plot(
-        sizes, [100 * f["in use"].regret_top2 for f in got], "o--", color=colour, mfc="white"
-    )
-for (name, size), accuracy in PAPER.items():
-    left.plot(size, accuracy, "*", ms=14, color=LINES[name], mec=INK, mew=0.8)
-left.plot([], [], "*", ms=12, color="white", mec=INK, label="the paper's")
-left.plot([], [], "o--", color=GREY, mfc="white", label="mirrors as one class")
-right.plot([], [], "o--", color=GREY, mfc="white", label="the better of the two best")
-left.set(
-    ylim=(0.5, 1.0), ylabel="share as the oracle chose", title="Accuracy of the predictions alone"
-)
-middle.set(ylim=(0.5, 1.0), title="Accuracy in use: to carry on is measured")
-right.set(yscale="log", ylabel="mean regret [%]", title="Window error above the oracle's, in use")
-for ax in axes:
-    ax.set(xscale="log", xlabel="training samples")
-    ax.grid(alpha=0.25)
-left.legend(loc="lower right")
-right.legend()
+pictures.learning_curves(curve, list(VECTORS), PAPER)
 plt.show()
 
 # %% [markdown]
@@ -385,28 +315,7 @@ table(
 )  # fmt: skip
 
 # %%
-counts = np.array(judged["confusion"]["counts"])
-seen = np.flatnonzero(counts.sum(axis=0) + counts.sum(axis=1))
-confused = counts[np.ix_(seen, seen)]
-parts = confused / np.maximum(confused.sum(axis=1, keepdims=True), 1)
-names = [words(judged["confusion"]["classes"][k]) for k in seen]
-fig, ax = plt.subplots(figsize=(10.5, 8.6))
-image = ax.imshow(parts, cmap="Greens", vmin=0, vmax=1)
-for row, column in zip(*np.nonzero(parts >= 0.01), strict=True):
-    ax.text(column, row, f"{100 * parts[row, column]:.0f}", ha="center", va="center", fontsize=8,
-            color="white" if parts[row, column] > 0.55 else INK)  # fmt: skip
-ax.set_xticks(range(len(names)), names, rotation=90, fontsize=9)
-ax.set_yticks(
-    range(len(names)),
-    [f"{n} ({c})" for n, c in zip(names, confused.sum(axis=1), strict=True)],
-    fontsize=9,
-)
-ax.set(
-    xlabel="chosen by the classifier",
-    ylabel="chosen by the oracle (throws)",
-    title="Per cent of the oracle's choices",
-)
-fig.colorbar(image, shrink=0.6)
+pictures.confusion(judged["confusion"])
 plt.show()
 
 # %% [markdown]

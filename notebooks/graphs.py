@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import study
+from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.colors import LogNorm
@@ -19,8 +20,10 @@ from matplotlib.typing import ColorType
 from dynresp.errors import MissingMotionDataError
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import find_plan, plans_folder, read_plan
-from dynresp.locomotion.clusters.forest import ClusterTree
+from dynresp.locomotion.choice.actions import choices
+from dynresp.locomotion.clusters.forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.config import Coordinates
 from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.distance import frame_distances, frame_features
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -254,3 +257,28 @@ def cluster_tree(
         axes.text(*at, str(cluster), ha="center", va="center", fontsize=8)
     axes.set_yticks([])
     return np.stack([entered, heights], axis=1)
+
+
+def offered(forest: ClusterForest, seed: int) -> None:
+    """Draw the choices at some frame: their ways over the ground, and the poses they stand for."""
+    graph = forest.graph
+    frame = int(np.random.default_rng(seed).choice(graph.frames))
+    place = placement.IDENTITY
+    if graph.config.coordinates is Coordinates.RELATIVE:
+        # At the origin, facing along x.
+        place = placement.inverse(graph.database.planar[frame])
+    actions = choices(forest, frame, place)
+    fig = plt.figure(figsize=(13, 3.4))
+    plan, *cells = fig.subplots(1, 1 + len(actions), width_ratios=(2.4, *(1.0 for _ in actions)))
+    ground(plan)
+    hues = (study.BLUE, study.ORANGE, study.GREEN, study.RED)
+    for k, (action, color, axes) in enumerate(zip(actions, hues, cells, strict=False)):
+        plan.plot(*action.path[:, :2].T, color=color, lw=2, label=str(k + 1))
+        plan.plot(*action.path[-1, :2], "o", color=color)
+        said = f"{k + 1}: {len(action.frames) / graph.config.fps:.1f} s"
+        pose_cell(axes, action.pose, said, color)
+    plan.plot(*actions[0].path[0, :2], "o", mfc="white", mec=study.INK, ms=8)
+    plan.margins(0.15)
+    plan.legend(loc="best", fontsize=8)
+    plan.set(xlabel="x [m]", ylabel="y [m]", title=f"frame {frame}")
+    plt.show()

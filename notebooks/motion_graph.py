@@ -26,19 +26,18 @@ import graphs
 import matplotlib as mpl
 import numpy as np
 import study
+import transitions
 from matplotlib import pyplot as plt
 from matplotlib.colors import LogNorm
 
+from dynresp.graphs.asked import Asked
 from dynresp.graphs.outing import Outing
-from dynresp.graphs.sketching import Asked, sketch_outing
+from dynresp.graphs.sketching import sketch_outing
 from dynresp.graphs.worlds import standing_about
-from dynresp.locomotion.choice.actions import choices
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.clusters.grouping import ClusterConfig, Clusters
 from dynresp.locomotion.clusters.mixture import MixtureConfig
 from dynresp.locomotion.clusters.observations import observations
-from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates
 from dynresp.locomotion.graph.walk import random_walk
 from dynresp.locomotion.playing.composing import compose
 from dynresp.locomotion.playing.gait import gait_of
@@ -67,33 +66,14 @@ for name, graph in ours.items():
 # and does not count it.
 
 # %%
-PAPER = {
-    "maze": (8318, 394284, 32229, None, None, 31469),
-    "terrain": (12879, 520193, 60130, None, None, 59043),
-    "stool": (4576, 30058, 4964, None, None, 4831),
-    "playground": (5971, 984152, 37209, 7091, None, 5458),
-}
-counted = {}
-for name, graph in ours.items():
-    c = graph.counts
-    counted[name] = (c.frames, c.contact, c.likelihood, c.similarity, c.footing, c.component)
-rows, shares = [], []
-for name, numbers in counted.items():
-    paper = "maze" if name == walking_name else name
-    for said, row in ((f"{paper}, paper", PAPER[paper]), (f"{name}, ours", numbers)):
-        rows.append((said, *("-" if n is None else f"{n:,}" for n in row)))
-        left = [row[0] ** 2, *(n for n in row[1:] if n is not None)]
-        part = iter(study.percent(b / a, 2) for a, b in pairwise(left))
-        of_each = ["-" if n is None else next(part) for n in row[1:]]
-        shares.append((said, *of_each, f"{row[-1] / row[0]:.1f}"))
-rules = ("contact", "likelihood", "similarity", "feet", "component")
-study.table(("", "frames", *rules), rows)
+rows = transitions.beside_the_paper(ours)
+transitions.print_counts(rows)
 
 # %% [markdown]
 # The same as shares of what the rule before has left; the first of all pairs. And how many jumps lead from a frame.
 
 # %%
-study.table(("", *rules, "jumps / frame"), shares)
+transitions.print_shares(rows)
 for name, graph in ours.items():
     inside = np.diff(graph.offsets) > 0
     lost = sum(not inside[clip.start : clip.stop].any() for clip in graph.database.clips)
@@ -165,25 +145,7 @@ plt.show()
 # stays in it.
 
 # %%
-SESSIONS = {
-    "back and forth": ("woddy2",),
-    "starts, crossings, spirals": ("start_", "cross_", "spiral_"),
-    "backward": ("Backward",),
-    "forward": ("Forward",),
-    "turns, circles, sideways": ("",),
-}
-names = [clip.name for clip in walking.database.clips]
-session = np.array(
-    [
-        next(k for k, parts in enumerate(SESSIONS.values()) if any(p in n for p in parts))
-        for n in names
-    ]
-)[walking.database.clip_of]
-jumps = walking.database.successors[walking.sources] != walking.targets
-between = np.zeros((len(SESSIONS), len(SESSIONS)), dtype=int)
-np.add.at(between, (session[walking.sources[jumps]], session[walking.targets[jumps]]), 1)
-rows = [(said, *(f"{n:,}" for n in line)) for said, line in zip(SESSIONS, between, strict=True)]
-study.table(("jumps from, to", *(said.split(",")[0] for said in SESSIONS)), rows)
+transitions.print_between_sessions(walking)
 
 # %% [markdown]
 # ## Clusters
@@ -316,34 +278,9 @@ plt.show()
 # Four actions, as far apart as can be, by the window of 4 s (section 5.1): their ways over the ground, and the poses that stand
 # for them. Walking, and then the playground, or the stool.
 
-
 # %%
-def offer(graph, forest, seed):
-    """Draw what is offered at some frame."""
-    frame = int(np.random.default_rng(seed).choice(graph.frames))
-    place = placement.IDENTITY
-    if graph.config.coordinates is Coordinates.RELATIVE:
-        # At the origin, facing along x.
-        place = placement.inverse(graph.database.planar[frame])
-    offered = choices(forest, frame, place)
-    fig = plt.figure(figsize=(13, 3.4))
-    plan, *cells = fig.subplots(1, 1 + len(offered), width_ratios=(2.4, *(1.0 for _ in offered)))
-    graphs.ground(plan)
-    hues = (study.BLUE, study.ORANGE, study.GREEN, study.RED)
-    for k, (action, color, axes) in enumerate(zip(offered, hues, cells, strict=False)):
-        plan.plot(*action.path[:, :2].T, color=color, lw=2, label=str(k + 1))
-        plan.plot(*action.path[-1, :2], "o", color=color)
-        said = f"{k + 1}: {len(action.frames) / graph.config.fps:.1f} s"
-        graphs.pose_cell(axes, action.pose, said, color)
-    plan.plot(*offered[0].path[0, :2], "o", mfc="white", mec=study.INK, ms=8)
-    plan.margins(0.15)
-    plan.legend(loc="best", fontsize=8)
-    plan.set(xlabel="x [m]", ylabel="y [m]", title=f"frame {frame}")
-    plt.show()
-
-
-offer(walking, ClusterForest(walking, usual[walking_name]), 2)
-offer(clustered, forest, 5)
+graphs.offered(ClusterForest(walking, usual[walking_name]), 2)
+graphs.offered(forest, 5)
 
 # %% [markdown]
 # ## Along a sketch, and through a maze

@@ -20,7 +20,7 @@ import matplotlib as mpl
 import numpy as np
 
 from dynresp.datasets.draws import Sample, draw_sample
-from dynresp.datasets.plan import Plan
+from dynresp.datasets.plan import DatasetPlan
 from dynresp.datasets.plan_reading import parse_plan
 from dynresp.datasets.reading import Dataset, load_dataset
 from dynresp.errors import UsageError
@@ -171,7 +171,7 @@ class Situation:
         config: Settings.
     """
 
-    plan: Plan
+    plan: DatasetPlan
     character: Character
     bases: tuple[Motion, ...]
     library: ReactionLibrary
@@ -258,3 +258,8 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
 def percent(share: float, digits: int = 1) -> str:
     """A share in words."""
     return f"{100 * share:.{digits}f} %"
+
+
+def words(name: str) -> str:
+    """The name of a reaction or a strategy as it is read."""
+    return name.replace("_mirrored", ", mirrored").replace("_", " ")

@@ -13,7 +13,8 @@ from typing import Annotated, Any
 import typer
 
 from dynresp.cli.options import Json, Motions, Seed
-from dynresp.cli.progress import Tell, progress
+from dynresp.cli.progress import progress
+from dynresp.progress import Progress
 
 # Time over which the rate is measured [s]; a bar is refreshed, and lines follow, this often [s].
 _RATE_S = 60.0
@@ -74,7 +75,7 @@ def generate(
     typer.echo(json.dumps(content, indent=2) if as_json else _told(content))
 
 
-def _paced(tell: Tell) -> Tell:
+def _paced(tell: Progress) -> Progress:
     """Adds rate and time left to what is told while samples are made."""
     on_terminal = sys.stderr.isatty()
     every = _BAR_S if on_terminal else _LINE_S

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dynresp.cli.graph_info import Graph
 from dynresp.cli.options import Json, Motions, Seed
+from dynresp.cli.outing import USUAL_FPS, Fps, Out, Video, finish
 from dynresp.cli.progress import progress
 from dynresp.cli.run import check_folder
 
 if TYPE_CHECKING:
     from dynresp.graphs.choosing import Pick
-    from dynresp.graphs.outing import Outing
-    from dynresp.locomotion.graph.motion_graph import MotionGraph
-
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
-Fps = Annotated[
-    float, typer.Option("--fps", min=1.0, max=240.0, help="Frame rate of the motion written.")
-]
-Video = Annotated[bool, typer.Option("--video/--no-video", help="Whether to draw a video.")]
-USUAL_FPS = 30.0
 
 
 def walk(
@@ -59,15 +51,19 @@ def walk(
 
     from dynresp.errors import UsageError
     from dynresp.graphs.outing import Outing
+    from dynresp.graphs.worlds import play_in_world, refuse_blocks
     from dynresp.locomotion.graph.file import load_graph
     from dynresp.locomotion.graph.walk import random_walk
-    from dynresp.locomotion.playing.composing import compose
     from dynresp.motion.character import default_character
 
     answers = None if choices is None else read_answers(choices)
+    if choose and answers is not None:
+        raise UsageError("--choices has the answers that --choose asks for; leave out one of them")
     if balls and (choose or answers is not None):
         raise UsageError("--balls goes with a walk by chance; leave out --choose and --choices")
     loaded = load_graph(graph)
+    if balls or choose or answers is not None:
+        refuse_blocks(loaded)
     check_folder(out)
     if balls:
         from dynresp.graphs.hitting import hit_outing
@@ -97,7 +93,7 @@ def walk(
         return
     frames = max(2, round(seconds * loaded.config.fps) + 1)
     path = random_walk(loaded, frames, np.random.default_rng(seed or 0))
-    composition = compose(loaded, default_character(), path, fps=fps)
+    composition = play_in_world(loaded, default_character(), path, fps)
     outing = Outing.of(
         composition,
         loaded,
@@ -154,13 +150,10 @@ def picker(answers: list[int] | None) -> Pick:
                 )
             return answer - 1 if answer else None
         while True:
-            try:
-                typed = typer.prompt("which (0: chance, q: enough)", default="0", err=True)
-            except typer.Abort:
-                raise Enough from None
-            if typed.strip().lower() == "q":
+            typed = asked("which (0: chance, q: enough) [0]: ")
+            if typed.lower() == "q":
                 raise Enough
-            known = next((n for n in range(len(words) + 1) if typed.strip() == str(n)), None)
+            known = next((n for n in range(len(words) + 1) if typed == str(n)), None)
             if known is not None:
                 return known - 1 if known else None
             typer.echo(f"expected a number from 0 to {len(words)}, or q", err=True)
@@ -168,45 +161,17 @@ def picker(answers: list[int] | None) -> Pick:
     return pick
 
 
-def finish(out: Path, graph: MotionGraph, outing: Outing, video: bool, as_json: bool) -> None:
-    """Write an outing and say what came of it.
+def asked(question: str) -> str:
+    """What somebody at the terminal types; 0 for nothing, and q where the typing ends.
 
-    Raises:
-        typer.Exit: With code 1, where it did not arrive, or a file could not be written.
+    The question goes to standard error: standard output is for what came of it all.
     """
-    from dynresp.experiments.folder import WRITTEN, is_failure
-    from dynresp.experiments.result import to_json
-    from dynresp.graphs.outing import write_outing
-    from dynresp.motion.character import default_character
-
-    with progress() as tell:
-        content = write_outing(out, graph, outing, default_character(), tell, video)
-    for name, what in content["files"].items():
-        if what != WRITTEN:
-            typer.echo(f"dynresp: {name} {what}", err=True)
-    typer.echo(to_json(content) if as_json else tell_outing(content, out))
-    if not outing.arrived:
-        typer.echo("dynresp: it did not arrive; result.json says how far it came", err=True)
-        raise typer.Exit(1)
-    if any(is_failure(what) for what in content["files"].values()):
-        raise typer.Exit(1)
-
-
-def tell_outing(content: dict[str, Any], out: Path) -> str:
-    """What came of an outing, for people."""
-    happened = content["happened"]
-    skate, blended = happened["foot_skate_m"], happened.get("foot_skate_as_blended_m")
-    before = f"; as blended {1000 * blended['median']:.0f} mm" if blended else ""
-    jumps = "" if happened["jumps"] is None else f", {happened['jumps']} jumps"
-    lines = [
-        content["title"],
-        f"  {happened['way_m']:.1f} m in {happened['seconds']:.1f} s{jumps}",
-        f"  feet slide {1000 * skate['median']:.0f} mm a stance (median), "
-        f"{1000 * skate['percentile_95']:.0f} mm at the 95th percentile, "
-        f"{1000 * skate['worst']:.0f} mm at most{before}",
-    ]
-    if content["graph"]["built_in_clips"]:
-        lines.append("  made of built-in motion, no motion capture")
-    lines += [f"  {line}" for line in content["graph"]["credits"]]
-    lines.append(f"  written to {out}")
-    return "\n".join(lines)
+    typer.echo(question, nl=False, err=True)
+    try:
+        line = sys.stdin.readline()
+    except KeyboardInterrupt:
+        line = ""
+    if not line:
+        typer.echo(err=True)
+        return "q"
+    return line.strip() or "0"

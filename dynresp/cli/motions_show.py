@@ -51,13 +51,13 @@ def show(
 def _draw(motion: Motion, out: Path) -> None:
     from dynresp.view.filmstrip import write_filmstrip
     from dynresp.view.recording import write_recording
-    from dynresp.view.story import Phase, Story
+    from dynresp.view.story import Story, StoryPhase
 
     # Two thirds of the files come at 120 frames a second, which no screen shows.
     shown = motion.resampled(30.0) if motion.fps > 30.0 else motion
     story = Story(
         shown,
-        phases=[Phase("base motion", 0.0, shown.duration)],
+        phases=[StoryPhase("base motion", 0.0, shown.duration)],
         title=motion.name,
         subtitle=f"{motion.duration:.1f} s",
     )

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import typer
 
-Tell = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many."""
+from dynresp.progress import Progress
 
 
 @contextmanager
-def progress() -> Iterator[Tell]:
+def progress() -> Iterator[Progress]:
     """What to tell progress to, while the block runs."""
     if sys.stderr.isatty():
         with _bar() as tell:
@@ -22,7 +21,7 @@ def progress() -> Iterator[Tell]:
         yield _lines()
 
 
-def _lines() -> Tell:
+def _lines() -> Progress:
     """A line whenever another stage begins."""
     last = ""
 
@@ -36,12 +35,13 @@ def _lines() -> Tell:
 
 
 @contextmanager
-def _bar() -> Iterator[Tell]:
+def _bar() -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as Bars
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task("starting", total=None)
 
         def tell(stage: str, done: int, of: int) -> None:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dynresp.cli.options import Json, Seed
-from dynresp.cli.progress import Tell, progress
+from dynresp.cli.progress import progress
+from dynresp.progress import Progress
 
 if TYPE_CHECKING:
     from dynresp.response.classifier import Classifier
@@ -126,7 +127,7 @@ def train(
         typer.echo(_told(trained.classifier, file))
 
 
-def with_elapsed(tell: Tell, clock: Callable[[], float] = time.monotonic) -> Tell:
+def with_elapsed(tell: Progress, clock: Callable[[], float] = time.monotonic) -> Progress:
     """Adds the time that a stage has taken; where there is no terminal, only now and then.
 
     Args:

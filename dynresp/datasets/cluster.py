@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dynresp.datasets.shards import Place
-from dynresp.datasets.work import Job, World, load
+from dynresp.datasets.work import Job, Workshop, load
 from dynresp.errors import DynrespError, UsageError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ _CONNECT_S = 20.0
 _GRACE_S = 1.0
 _LOOK_S = 0.5
 _ADDRESS = re.compile(r"(tcp|tls)://[^/\s]+:\d{1,5}")
-# Loaded once in each thread of a worker: a world is no thing for two threads at once.
+# Loaded once in each thread of a worker: a workshop is no thing for two threads at once.
 _own = threading.local()
 
 
@@ -251,7 +251,7 @@ def make_on_worker(job: Job, place: Place) -> bytes:
         DynrespError: It could not be done there.
     """
     try:
-        return _world(job).make(place)
+        return _workshop(job).make(place)
     except DynrespError as error:
         from distributed import get_worker
 
@@ -259,15 +259,15 @@ def make_on_worker(job: Job, place: Place) -> bytes:
         raise DynrespError(f"worker {get_worker().address}: {error}") from None
 
 
-def _world(job: Job) -> World:
+def _workshop(job: Job) -> Workshop:
     key = (job.manifest["identity"], job.beside, job.motions)
     if getattr(_own, "key", None) != key:
         # A folder that is on this machine, or else what the machine itself is told.
         here = job.motions is not None and job.motions.is_dir()
-        _own.world = load(job if here else replace(job, motions=None))
+        _own.workshop = load(job if here else replace(job, motions=None))
         _own.key = key
-    world: World = _own.world
-    return world
+    workshop: Workshop = _own.workshop
+    return workshop
 
 
 def _gone(address: str) -> DynrespError:

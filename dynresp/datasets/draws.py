@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.plan import Plan, PlannedImpact
+from dynresp.datasets.plan import DatasetPlan, PlannedImpact
 from dynresp.errors import SpecError
 from dynresp.experiments.hits import draw_hits
 from dynresp.experiments.spec import PushTable
@@ -41,7 +41,7 @@ class Sample:
     impact: Impact
 
 
-def draw_sample(plan: Plan, durations: Sequence[float], index: int) -> Sample:
+def draw_sample(plan: DatasetPlan, durations: Sequence[float], index: int) -> Sample:
     """Draw a sample.
 
     It depends on the plan, its seed and the index alone, not on how many there are.
@@ -83,7 +83,7 @@ def lead_s(radius: float, speed: float | None) -> float:
     return 0.0 if speed is None else flight_s(radius, speed)
 
 
-def check_durations(plan: Plan, durations: Sequence[float]) -> None:
+def check_durations(plan: DatasetPlan, durations: Sequence[float]) -> None:
     """Refuse base motions that are too short for the plan's impacts, before any work.
 
     Raises:

@@ -21,7 +21,7 @@ from dynresp.datasets.facts import (
     read_manifest,
 )
 from dynresp.datasets.manifest import MANIFEST, differences, told, write_manifest
-from dynresp.datasets.plan import Plan
+from dynresp.datasets.plan import DatasetPlan
 from dynresp.datasets.processes import cores, make_here
 from dynresp.datasets.schema import Columns
 from dynresp.datasets.shards import (
@@ -35,16 +35,14 @@ from dynresp.datasets.shards import (
     shard_files,
     stated,
 )
-from dynresp.datasets.work import Job, World
+from dynresp.datasets.work import Job, Workshop
 from dynresp.errors import DynrespError, UsageError
 from dynresp.files import replacing
 from dynresp.paths import expanded
+from dynresp.progress import Progress
 
 SHARD_SIZE = 500
 """Samples of a shard where nothing else is said: about ten seconds of one core."""
-
-Tell = Callable[[str, int, int], None]
-"""Told the stage, how many samples are done, and of how many."""
 
 
 @dataclass
@@ -90,14 +88,14 @@ class Summary:
 
 
 def generate(
-    plan: Plan,
+    plan: DatasetPlan,
     beside: Path,
     out: Path,
     motions: Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     shard_size: int | None = None,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
     loaded: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> Summary:
     """Make a dataset, or what is still missing of it.
@@ -128,8 +126,8 @@ def generate(
         connection_security(scheduler)
     with _locked(out):
         tell("loading motions", 0, plan.plan.count)
-        world = World(plan, beside.resolve(), motions)
-        manifest = world.manifest(_shard_size(out, shard_size, world))
+        workshop = Workshop(plan, beside.resolve(), motions)
+        manifest = workshop.manifest(_shard_size(out, shard_size, workshop))
         there = _checked(out, manifest)
         if loaded is not None:
             loaded(manifest)
@@ -145,7 +143,7 @@ def generate(
             write_manifest(manifest, out)
         named = None if motions is None else expanded(motions, "--motions").resolve()
         job = Job(plan, beside.resolve(), named, manifest)
-        del world
+        del workshop
         _make(job, facts, wanted, out, workers, scheduler, summary, tell)
     return summary
 
@@ -158,7 +156,7 @@ def _make(
     workers: int | None,
     scheduler: str | None,
     summary: Summary,
-    tell: Tell,
+    tell: Progress,
 ) -> None:
     """Make shards, and write each as soon as it is there."""
     if not wanted:
@@ -201,7 +199,7 @@ def _make(
 
 
 def _wanted(
-    out: Path, facts: Facts, summary: Summary, tell: Tell, known: bool
+    out: Path, facts: Facts, summary: Summary, tell: Progress, known: bool
 ) -> dict[Place, bool]:
     """The shards that must be made, and whether each takes the place of a bad one.
 
@@ -257,7 +255,7 @@ def _fewer(out: Path, there: int, asked: int, how: str = "") -> UsageError:
     )
 
 
-def _shard_size(out: Path, asked: int | None, world: World) -> int:
+def _shard_size(out: Path, asked: int | None, workshop: Workshop) -> int:
     """The size that a begun dataset has, or the one that is asked for."""
     if asked is not None:
         return asked
@@ -274,7 +272,7 @@ def _shard_size(out: Path, asked: int | None, world: World) -> int:
             if not 1 <= size <= MAX_SHARD_SIZE or (place.identity, size) in tried:
                 continue
             tried.add((place.identity, size))
-            if world.manifest(size)["identity"] == place.identity:
+            if workshop.manifest(size)["identity"] == place.identity:
                 return size
     return SHARD_SIZE
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dynresp.datasets.plan import KINDS, Plan, plain
+from dynresp.datasets.plan import KINDS, DatasetPlan, plain
 from dynresp.datasets.schema import PARAMETERS, SCHEMA_VERSION
 from dynresp.experiments.motions import Taken, about_library
 from dynresp.experiments.result import versions
@@ -27,7 +27,7 @@ _FREE_OF_PLAN = ("count", "name")
 
 
 def make_manifest(
-    plan: Plan,
+    plan: DatasetPlan,
     shard_size: int,
     character: Character,
     bases: Sequence[Taken],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from dynresp.experiments.spec import (
     BallTable,
@@ -29,20 +29,10 @@ KINDS = ("ball", "punch", "push")
 HIT = "hit"
 """Under this name the keys that an impact shares with an experiment's stand in the model."""
 
+# A list of tables: at least one, and not too many.
+_TABLES = Field(strict=False, min_length=1, max_length=MAX_TABLES)
+
 Weight: TypeAlias = Annotated[float, fixed(1e-6, 1e6)]
-
-
-def _tables(key: str) -> BeforeValidator:
-    """For a list of tables: says what to write where there is none, one, or too many."""
-
-    def check(given: Any) -> Any:
-        if isinstance(given, dict):
-            raise ValueError(f"write [[{key}]], with two brackets on each side")
-        if isinstance(given, list) and not 1 <= len(given) <= MAX_TABLES:
-            raise ValueError(f"expected 1 to {MAX_TABLES} tables [[{key}]], got {len(given)}")
-        return given
-
-    return BeforeValidator(check)
 
 
 class PlanTable(Strict):
@@ -94,17 +84,17 @@ class PlannedImpact(Strict):
         return {**own, HIT: {**rest, "time_s": 0.0}}
 
 
-class Plan(Strict):
+class DatasetPlan(Strict):
     """A whole plan file."""
 
     plan: PlanTable
-    base: Annotated[tuple[PlannedBase, ...], _tables("base"), Field(strict=False)]
-    impact: Annotated[tuple[PlannedImpact, ...], _tables("impact"), Field(strict=False)]
+    base: Annotated[tuple[PlannedBase, ...], _TABLES]
+    impact: Annotated[tuple[PlannedImpact, ...], _TABLES]
     library: LibraryTable = LibraryTable()
     settings: SettingsTable = SettingsTable()
 
     @model_validator(mode="after")
-    def _names_differ(self) -> Plan:
+    def _names_differ(self) -> DatasetPlan:
         names = [base.title for base in self.base]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -113,7 +103,7 @@ class Plan(Strict):
             )
         return self
 
-    def changed(self, count: int | None, seed: int | None) -> Plan:
+    def changed(self, count: int | None, seed: int | None) -> DatasetPlan:
         """The same plan with the count and the seed of the command line, where there are any."""
         table = self.plan.model_copy(
             update={
@@ -124,7 +114,7 @@ class Plan(Strict):
         return self.model_copy(update={"plan": table})
 
 
-def plain(plan: Plan) -> dict[str, Any]:
+def plain(plan: DatasetPlan) -> dict[str, Any]:
     """A plan with its defaults filled in, but for those that are none, as a manifest holds it."""
     content: dict[str, Any] = _plain(plan)
     for impact in content["impact"]:

@@ -206,11 +206,11 @@ def _work(job: Job, pipe: Connection) -> None:
 
     try:
         try:
-            world = load(job)
+            workshop = load(job)
             while True:
                 place: Place = pipe.recv()
                 tell("begun")
-                tell("made", world.make(place, lambda done: tell("done", done)))
+                tell("made", workshop.make(place, lambda done: tell("done", done)))
         except DynrespError as error:
             tell("error", str(error))
         except (EOFError, BrokenPipeError, ConnectionResetError):

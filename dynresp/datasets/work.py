@@ -9,7 +9,7 @@ from typing import Any
 
 from dynresp.datasets.draws import check_durations, draw_sample
 from dynresp.datasets.manifest import differences, make_manifest, told
-from dynresp.datasets.plan import Plan
+from dynresp.datasets.plan import DatasetPlan
 from dynresp.datasets.schema import columns, drawn, joined, labelled
 from dynresp.datasets.shards import Place, encode
 from dynresp.errors import DynrespError, MotionError, SpecError
@@ -33,20 +33,20 @@ class Job:
         manifest: Of the dataset, which the worker's own must equal.
     """
 
-    plan: Plan
+    plan: DatasetPlan
     beside: Path
     motions: Path | None
     manifest: Mapping[str, Any]
 
 
-class World:
+class Workshop:
     """A plan with all that it needs, loaded.
 
     Attributes:
         plan: The plan.
     """
 
-    def __init__(self, plan: Plan, beside: Path, motions: Path | None = None) -> None:
+    def __init__(self, plan: DatasetPlan, beside: Path, motions: Path | None = None) -> None:
         """Load motions and library, and cut the library's windows.
 
         Args:
@@ -131,14 +131,14 @@ class World:
         return encode(joined(parts, self._layout), self._layout, place)
 
 
-def load(job: Job) -> World:
+def load(job: Job) -> Workshop:
     """Load a job where a worker is, and see that it has what the job was planned with.
 
     Raises:
         DynrespError: Something is missing here, or is not what it is where the job comes from.
     """
-    world = World(job.plan, job.beside, job.motions)
-    own = world.manifest(job.manifest["shard_size"])
+    workshop = Workshop(job.plan, job.beside, job.motions)
+    own = workshop.manifest(job.manifest["shard_size"])
     found = differences(job.manifest, own)
     if found:
         raise DynrespError(
@@ -146,4 +146,4 @@ def load(job: Job) -> World:
             "Install the same versions and put the same motion files there, and name their folder "
             "with DYNRESP_MOTIONS."
         )
-    return world
+    return workshop

@@ -15,10 +15,11 @@ from dynresp.experiments.hits import Hit
 from dynresp.experiments.result import describe, outcome, write_json
 from dynresp.experiments.showing import show
 from dynresp.experiments.spec import Artefact, OutputTable
-from dynresp.experiments.story_files import Progress, story_writers, write_files
+from dynresp.experiments.story_files import story_writers, write_files
 from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
 from dynresp.physics.impacts import Strike
+from dynresp.progress import Progress
 from dynresp.response.quality import Quality
 from dynresp.response.response import Response, ResponseConfig
 from dynresp.response.surface import landscape

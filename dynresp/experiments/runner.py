@@ -26,11 +26,11 @@ from dynresp.experiments.report import write_response
 from dynresp.experiments.result import versions, write_json
 from dynresp.experiments.settings import in_force, response_config
 from dynresp.experiments.spec import Experiment, StrikerCut, StrikeTable
-from dynresp.experiments.story_files import Progress
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.sources import motion_folders
 from dynresp.physics.impacts import Ball, prepare
+from dynresp.progress import Progress
 from dynresp.response.quality import Quality, measure
 from dynresp.response.respond import Responder
 from dynresp.response.response import Response, ResponseConfig

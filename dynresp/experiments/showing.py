@@ -12,7 +12,7 @@ from dynresp.motion.motion import Motion, move_poses
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import GRAVITY, Impact, PreparedImpact, Strike
 from dynresp.response.response import CARRY_ON, Response
-from dynresp.view.story import Event, MovingSphere, Phase, Story
+from dynresp.view.story import MovingSphere, Story, StoryEvent, StoryPhase
 
 # A ball is seen coming for this long before its flight is simulated, a fist for less [s].
 _BALL_SEEN_S = 1.3
@@ -70,29 +70,29 @@ def show(response: Response, impact: Impact, lead_in_s: float, title: str, subti
     return Shown(story, first)
 
 
-def _events(response: Response, first: int, end: float) -> list[Event]:
+def _events(response: Response, first: int, end: float) -> list[StoryEvent]:
     fps = response.motion.fps
     events = []
     if response.contact is not None:
         at = (response.start - first) / fps + response.contact.time_s
-        events.append(Event("contact", min(at, end)))
+        events.append(StoryEvent("contact", min(at, end)))
     if response.exit is not None and response.end is not None:
-        events.append(Event("exit", (response.exit - first) / fps))
-        events.append(Event("blend ends", (response.end - first) / fps))
+        events.append(StoryEvent("exit", (response.exit - first) / fps))
+        events.append(StoryEvent("blend ends", (response.end - first) / fps))
     return events
 
 
-def _phases(response: Response, first: int, end: float) -> list[Phase]:
+def _phases(response: Response, first: int, end: float) -> list[StoryPhase]:
     fps = response.motion.fps
     if response.exit is None or response.end is None or response.contact is None:
-        return [Phase("base motion", 0.0, end)]
+        return [StoryPhase("base motion", 0.0, end)]
     contact = (response.start - first) / fps + response.contact.time_s
     out, done = ((frame - first) / fps for frame in (response.exit, response.end))
     return [
-        Phase("base motion", 0.0, contact),
-        Phase("physics", contact, out),
-        Phase("blend", out, done),
-        Phase("base motion" if response.choice == CARRY_ON else "reaction", done, end),
+        StoryPhase("base motion", 0.0, contact),
+        StoryPhase("physics", contact, out),
+        StoryPhase("blend", out, done),
+        StoryPhase("base motion" if response.choice == CARRY_ON else "reaction", done, end),
     ]
 
 

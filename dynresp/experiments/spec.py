@@ -37,8 +37,6 @@ def _check_body(given: str) -> None:
 
 
 def _one_impact(given: Any) -> Any:
-    if isinstance(given, dict):
-        raise ValueError("write [[impact]], with two brackets on each side")
     if isinstance(given, list) and len(given) != 1:
         raise ValueError(
             f"an experiment takes one [[impact]], this one has {len(given)}; "

@@ -7,10 +7,9 @@ from pathlib import Path
 
 from dynresp.experiments.folder import attempt
 from dynresp.motion.character import Character
+from dynresp.progress import Progress
 from dynresp.view.story import Story
 
-Progress = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many."""
 Writer = Callable[[Path], None]
 """Writes a file to the path it is given."""
 

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 
-from dynresp.errors import MissingMotionDataError
+from dynresp.errors import MissingMotionDataError, SpecError
 from dynresp.experiments.motions import BUILTIN_PREFIX, about_cut, find_motion, load_cut
 from dynresp.experiments.spec import MotionCut
 from dynresp.graphs.plan import GraphPlan
 from dynresp.graphs.worlds import lay_out
 from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.builtin import builtin_names
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
-from dynresp.motion.sources import checked_relative_path, list_motion_files
-
-Progress = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many."""
+from dynresp.motion.sources import checked_relative_path, fits_pattern, list_motion_files
+from dynresp.progress import Progress
 
 _NAMED_MISSING = 5
 
@@ -46,11 +45,12 @@ def build_graph(
 
     Raises:
         MissingMotionDataError: Motion files are not on this machine.
-        SpecError: A name with wildcards leads out of the folders.
+        SpecError: A name with wildcards leads out of the folders, or stands for built-in motion; or
+            `leave_out` names what the plan does not hold.
         DynrespError: A file cannot be read, or there is no graph of what it holds.
     """
     spelled = [cut for given in plan.motion for cut in _spelled_out(given, folders, beside)]
-    cuts = [cut for cut in spelled if cut.motion not in plan.leave_out]
+    cuts = _taken(spelled, plan.leave_out)
     found = [find_motion(cut.motion, folders, beside) for cut in cuts]
     _refuse_missing([c.motion for c, f in zip(cuts, found, strict=True) if f is None], folders)
     motions: list[Motion] = []
@@ -75,21 +75,44 @@ def build_graph(
 
 def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:
     """A table for each file that a name with wildcards stands for; else the table itself."""
-    if given.motion.startswith(BUILTIN_PREFIX) or not _has_wildcards(given.motion):
+    if not _has_wildcards(given.motion):
         return [given]
+    if given.motion.startswith(BUILTIN_PREFIX):
+        raise SpecError(
+            f"motion: {given.motion!r} has wildcards, and built-in motions are named one by one, "
+            f"in a [[motion]] each; there are {', '.join(builtin_names())}"
+        )
     # A plan may lie in a home folder: only what the name spells out is looked through.
-    folders_named = PurePosixPath(checked_relative_path(given.motion)).parts[:-1]
-    fixed = list(takewhile(lambda part: not _has_wildcards(part), folders_named))
+    parts = PurePosixPath(checked_relative_path(given.motion)).parts
+    fixed = list(takewhile(lambda part: not _has_wildcards(part), parts[:-1]))
     for folder in (beside, *folders):
         below = folder.joinpath(*fixed)
         if not os.path.isdir(below):
             continue
-        files = [file.relative_to(folder).as_posix() for file in list_motion_files(below)]
-        matching = [name for name in files if fnmatchcase(name, given.motion)]
+        listed = list_motion_files(below, levels=len(parts) - len(fixed))
+        names = [file.relative_to(folder).as_posix() for file in listed]
+        matching = [name for name in names if fits_pattern(name, given.motion)]
         if matching:
             return [given.model_copy(update={"motion": name}) for name in matching]
     _refuse_missing([given.motion], folders)
     return []
+
+
+def _taken(spelled: list[MotionCut], leave_out: Sequence[str]) -> list[MotionCut]:
+    """The tables but for what is left out."""
+    named = {cut.motion for cut in spelled}
+    for name in leave_out:
+        if name not in named:
+            close = difflib.get_close_matches(name, named, n=3, cutoff=0.3)
+            meant = f"; the nearest are {', '.join(close)}" if close else ""
+            raise SpecError(
+                f"leave_out: {name!r} is none of the {len(named)} motions that the [[motion]] "
+                f"tables stand for{meant}"
+            )
+    taken = [cut for cut in spelled if cut.motion not in leave_out]
+    if not taken:
+        raise SpecError("leave_out names all motions of the plan; leave some of them in")
+    return taken
 
 
 def _has_wildcards(name: str) -> bool:

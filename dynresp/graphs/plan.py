@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from dynresp.errors import SpecError, UnknownNameError, UsageError
-from dynresp.experiments.mistakes import explain_in_tables, read_toml, validate
+from dynresp.experiments.mistakes import Layout, read_toml, validate
 from dynresp.experiments.spec import MotionCut, Strict
 from dynresp.experiments.values import fixed
 from dynresp.locomotion.graph.config import Coordinates, GraphConfig
@@ -76,17 +75,15 @@ class GraphPlan(Strict):
     leave_out: Annotated[list[str], Field(default_factory=list, max_length=1000)]
 
 
-_TABLES: dict[tuple[str, ...], type[BaseModel]] = {
-    (): GraphPlan,
-    ("graph",): GraphTable,
-    ("motion",): MotionCut,
-}
-_HINTS = {
-    "graph": "add [graph] with name",
-    "name": "say in a few words what the graph is of",
-    "motion": 'add [[motion]] with motion = "builtin:walk", a path inside a motions folder, or one '
-    "with * for several files",
-}
+_LAYOUT = Layout(
+    tables={(): GraphPlan, ("graph",): GraphTable, ("motion",): MotionCut},
+    hints={
+        "graph": "add [graph] with name",
+        "name": "say in a few words what the graph is of",
+        "motion": 'add [[motion]] with motion = "builtin:walk", a path inside a motions folder, or '
+        "one with * for several files",
+    },
+)
 
 
 def plans_folder() -> Path:
@@ -129,14 +126,9 @@ def read_plan(path: Path | str) -> GraphPlan:
             allowed. The message names the file, the key, what was given and what is allowed.
     """
     content = read_toml(Path(path), "a graph plan")
-    plan = validate(GraphPlan, content, str(path), partial(_explain, content=content))
+    plan = validate(GraphPlan, content, str(path), _LAYOUT)
     try:
         plan.graph.config()
     except UsageError as error:
         raise SpecError(f"{path}: [graph]: {error}") from None
     return plan
-
-
-def _explain(error: dict[str, Any], content: dict[str, Any]) -> str:
-    """One mistake in words: where, what was given, what is allowed."""
-    return explain_in_tables(error, content, _TABLES, _HINTS)

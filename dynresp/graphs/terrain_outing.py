@@ -75,7 +75,7 @@ def terrain_outing(
         composition,
         graph,
         title="A walk over rough terrain",
-        subtitle=f"{told}; blocks of {terrain.block_m:g} m, steps of up to "
+        subtitle=f"{told}; blocks of {terrain.block_m:.2f} m, steps of up to "
         f"{3 * terrain.level_m:.2f} m, seed {asked.seed}",
         blocks=shown_blocks(terrain, motion.root_positions),
         paths=[] if path is None else [GroundPath("sketch", path)],

@@ -18,11 +18,11 @@ from dynresp.learning.figures import (
     measure,
     merge_mirrors,
 )
-from dynresp.learning.fitting import Progress
 from dynresp.learning.groups import Groups
 from dynresp.learning.labelled import Labelled, groups_of, labelled
 from dynresp.learning.latency import latency_us
 from dynresp.learning.split import Split
+from dynresp.progress import Progress
 from dynresp.response.classifier import Classifier, ClassifierError, TrainedFor
 
 # Nearest neighbours take a second for so many samples and a hundred thousand to look among.

@@ -21,14 +21,13 @@ from dynresp.errors import UsageError
 from dynresp.learning.figures import Figures, in_use, measure
 from dynresp.learning.labelled import Labelled
 from dynresp.motion.rotations import FloatArray
+from dynresp.progress import Progress
 from dynresp.response.prediction import PairwiseQuadratic
 
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
 
 Result = TypeVar("Result")
-Progress = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many; while a fit goes on again and again."""
 
 # Memory for rows of the kernel [MiB]; each is as long as there are samples.
 _CACHE_MIB = 1_000

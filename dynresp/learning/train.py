@@ -16,7 +16,6 @@ from dynresp.errors import UnknownNameError, UsageError
 from dynresp.learning.figures import in_use, measure
 from dynresp.learning.fitting import (
     Parameters,
-    Progress,
     Tried,
     by_merit,
     cross_validate,
@@ -26,6 +25,7 @@ from dynresp.learning.fitting import (
 from dynresp.learning.groups import Groups
 from dynresp.learning.labelled import Labelled, groups_of, labelled
 from dynresp.learning.split import Split
+from dynresp.progress import Progress
 from dynresp.response.classifier import GROUPINGS, Classifier, TrainedFor, TrainedOn
 from dynresp.response.features import FEATURE_NAMES, SLICES_S, vector_columns
 from dynresp.response.prediction import PairwiseQuadratic

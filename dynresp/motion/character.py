@@ -12,7 +12,6 @@ import functools
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import mujoco
 import numpy as np
@@ -21,9 +20,8 @@ import numpy.typing as npt
 from dynresp import paths
 from dynresp.errors import MotionError, UnknownNameError
 from dynresp.motion import rotations
+from dynresp.motion.arrays import frozen
 from dynresp.motion.rotations import FloatArray
-
-Scalar = TypeVar("Scalar", bound=np.generic)
 
 POSE_SIZE = 59
 VELOCITY_SIZE = 45
@@ -93,12 +91,12 @@ class Character:
         bodies = range(1, self.model.nbody)
         self.body_names = tuple(self.model.body(i).name for i in bodies)
         self.joint_names = tuple(self.model.joint(i).name for i in range(1, self.model.njnt))
-        self.parents = _frozen(self.model.body_parentid[1:] - 1)
-        self.offsets = _frozen(np.where(self.parents[:, None] < 0, 0.0, self.model.body_pos[1:]))
-        self.masses = _frozen(self.model.body_mass[1:])
-        self.mirror_bodies = _frozen(_mirror_permutation(self.body_names))
+        self.parents = frozen(self.model.body_parentid[1:] - 1)
+        self.offsets = frozen(np.where(self.parents[:, None] < 0, 0.0, self.model.body_pos[1:]))
+        self.masses = frozen(np.array(self.model.body_mass[1:]))
+        self.mirror_bodies = frozen(_mirror_permutation(self.body_names))
         self._mirror_joints = _mirror_permutation(self.joint_names)
-        self.rest_pose = _frozen(self.model.qpos0)
+        self.rest_pose = frozen(np.array(self.model.qpos0))
         self._center_offsets = self.model.body_ipos[1:].copy()
         self._parents = self.parents.astype(np.int64)
         self.identity = hashlib.sha256(_contents(self.model)).hexdigest()[:16]
@@ -244,9 +242,3 @@ def _contents(model: mujoco.MjModel) -> bytes:
     parts = (model.body_parentid, model.body_pos, model.body_mass, model.body_inertia,
              model.body_ipos, model.geom_type, model.geom_size, model.geom_pos)  # fmt: skip
     return b"".join((np.round(part, 9) + 0.0).astype("<f8").tobytes() for part in parts)
-
-
-def _frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
-    copy = np.array(array)
-    copy.flags.writeable = False
-    return copy

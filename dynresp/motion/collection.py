@@ -5,7 +5,6 @@ They are read from the files that need them, so that a collection cannot go stal
 
 from __future__ import annotations
 
-import fnmatch
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -13,7 +12,7 @@ from typing import Any
 
 from dynresp.errors import SpecError, UnknownNameError
 from dynresp.motion.catalogue import SourceFile, load_sources
-from dynresp.motion.sources import MOTION_SUFFIXES, checked_relative_path
+from dynresp.motion.sources import MOTION_SUFFIXES, checked_relative_path, fits_pattern
 from dynresp.paths import examples_folder, reactions_folder
 
 GRAPHS = "graphs"
@@ -72,7 +71,7 @@ def collection_files(
     for library in libraries:
         for given in files_named_in(library):
             clips = [file for file, source in sources.items() if source.kind == "clip"]
-            files = fnmatch.filter(clips, given) if "*" in given else [given]
+            files = [c for c in clips if fits_pattern(c, given)] if "*" in given else [given]
             file = next((file for file in files or [given] if file not in sources), None)
             if file is not None:
                 raise SpecError(

@@ -44,7 +44,7 @@ class LoadOptions:
 
 
 def load_motion(
-    path: Path, character: Character | None = None, options: LoadOptions | None = None
+    path: Path | str, character: Character | None = None, options: LoadOptions | None = None
 ) -> Motion:
     """Read a motion file, lay it onto the character and set it on the floor.
 
@@ -66,7 +66,7 @@ def load_motion(
     options = options or LoadOptions()
     if options.asf is not None:
         options = replace(options, asf=options.asf.resolve())
-    resolved = path.resolve()
+    resolved = Path(path).resolve()
     try:
         stamps = _stamps(resolved, options.asf)
     except OSError as error:

@@ -6,6 +6,7 @@ forward slashes. Nothing here uses the network.
 
 from __future__ import annotations
 
+import fnmatch
 import os
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -106,7 +107,18 @@ def find_motion_file(relative_path: str, folders: Iterable[Path]) -> Path | None
     return None
 
 
-def list_motion_files(folder: Path) -> list[Path]:
+def fits_pattern(relative_path: str, pattern: str) -> bool:
+    """Whether a path is one that a name with wildcards stands for.
+
+    Args:
+        relative_path: Path inside a motions folder, with forward slashes.
+        pattern: The same with `*`, `?` or `[...]`, none of which stands for a slash.
+    """
+    parts, patterns = relative_path.split("/"), pattern.split("/")
+    return len(parts) == len(patterns) and all(map(fnmatch.fnmatchcase, parts, patterns))
+
+
+def list_motion_files(folder: Path, levels: int | None = None) -> list[Path]:
     """List the motion files below a folder.
 
     A file counts by its suffix; `.txt` and `.json` files count only if they begin like a
@@ -115,6 +127,7 @@ def list_motion_files(folder: Path) -> list[Path]:
 
     Args:
         folder: Folder to look through.
+        levels: How deep: 1 for the folder itself alone, None for all that is below it.
 
     Returns:
         Paths that begin with `folder`, sorted.
@@ -125,7 +138,9 @@ def list_motion_files(folder: Path) -> list[Path]:
     _existing_folder(folder, "the motions folder")
     found: list[Path] = []
     for root, subfolders, names in os.walk(folder, onerror=_refuse_unreadable):
-        subfolders[:] = [name for name in subfolders if not name.startswith(".")]
+        deep = len(Path(root).relative_to(folder).parts) + 1
+        inner = [name for name in subfolders if not name.startswith(".")]
+        subfolders[:] = inner if levels is None or deep < levels else []
         for name in names:
             path = Path(root, name)
             if not name.startswith(".") and _looks_like_motion(path):

@@ -32,6 +32,7 @@ COMMANDS = (
     ("bench", "align"),
     ("bench", "respond"),
     ("bench", "generate"),
+    ("bench", "graph"),
 )
 # Packages that take long to import; help must do without them.
 HEAVY = (

@@ -4,7 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from dynresp.cli.app import app
 from dynresp.motion.readers.npz import read_npz
 
 from .conftest import Command
@@ -15,10 +17,6 @@ FILES = {"motion.npz", "motion.bvh", "recording.html", "filmstrip.png", "plan.pn
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from typer.testing import CliRunner
-
-    from dynresp.cli.app import app
-
     path = tmp_path_factory.mktemp("graph") / "builtin.npz"
     result = CliRunner().invoke(app, ["graph", "build", "builtin", "--out", str(path)])
     assert result.exit_code == 0, result.output
@@ -121,6 +119,31 @@ class TestWalk:
         assert [moment["picked"] for moment in content["choices"]] == [1, None, 0]
         assert all(len(moment["offered"]) >= 3 for moment in content["choices"])
         assert (out / "options.png").read_bytes().startswith(PNG)
+
+    @pytest.mark.parametrize(
+        ("typed", "picked"), [("2\n7\n\nq\n", [1, None]), ("1\n", [0]), ("", [])]
+    )
+    def test_somebody_is_asked(
+        self, graph: Path, tmp_path: Path, typed: str, picked: list[int | None]
+    ) -> None:
+        words = ["graph", "walk", str(graph), "--out", str(tmp_path / "out")]
+        result = CliRunner().invoke(app, [*words, "--choose", "--no-video", "--json"], input=typed)
+        assert result.exit_code == 0, result.stderr
+        # Nothing but the JSON.
+        assert result.stdout.startswith("{")
+        content = json.loads(result.stdout)
+        assert [moment["picked"] for moment in content["choices"]] == picked
+        assert "which (0: chance, q: enough)" in result.stderr
+        assert ("expected a number from 0 to" in result.stderr) == ("7" in typed)
+
+    def test_answers_and_questions_at_once(
+        self, dynresp: Command, graph: Path, tmp_path: Path
+    ) -> None:
+        words = ("graph", "walk", graph, "--out", tmp_path / "out", "--choose", "--choices", "1")
+        result = dynresp(*words)
+        assert result.exit_code == 2
+        assert "leave out one of them" in result.stderr
+        assert not (tmp_path / "out").exists()
 
     @pytest.mark.parametrize(
         ("choices", "said"), [("1,x", "expected whole numbers"), ("9", "actions are offered")]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.plan import Plan
+from dynresp.datasets.plan import DatasetPlan
 from dynresp.datasets.plan_reading import parse_plan
 from dynresp.datasets.schema import Column, Columns, columns
 
@@ -48,7 +48,7 @@ LAYOUT: tuple[Column, ...] = columns(5, 3)
 """Of made-up shards: five features, three classes."""
 
 
-def plan(**table: Any) -> Plan:
+def plan(**table: Any) -> DatasetPlan:
     """The plan above, its `[plan]` changed."""
     content = tomllib.loads(PLAN)
     content["plan"].update(table)

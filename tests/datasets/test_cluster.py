@@ -18,7 +18,7 @@ import pytest
 
 from dynresp.datasets import cluster
 from dynresp.datasets.shards import places
-from dynresp.datasets.work import Job, World
+from dynresp.datasets.work import Job, Workshop
 from dynresp.errors import DynrespError, UsageError
 
 from .samples import command, files, plan, ran, write_plan
@@ -133,8 +133,8 @@ def test_a_scheduler_that_dies(tmp_path: Path, words: list[object]) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_with_other_things_is_refused(tmp_path: Path, world: World) -> None:
-    manifest = {**world.manifest(8), "features": ["another"]}
+def test_a_worker_with_other_things_is_refused(tmp_path: Path, workshop: Workshop) -> None:
+    manifest = {**workshop.manifest(8), "features": ["another"]}
     job = Job(plan(), tmp_path, tmp_path / "not there", manifest)
     with scheduler(tmp_path) as (address, _), ExitStack() as stack:
         # A cluster may get its workers later.

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dynresp.datasets.generate import Summary
-from dynresp.datasets.plan import KINDS, Plan
+from dynresp.datasets.plan import KINDS, DatasetPlan
 from dynresp.datasets.plan_reading import parse_plan
 from dynresp.datasets.schema import columns
 from dynresp.paths import examples_folder
@@ -32,7 +32,7 @@ def test_all_columns_are_explained_in_order() -> None:
 
 @pytest.mark.parametrize("table", ["plan", "base", "impact", "library", "settings"])
 def test_all_tables_of_a_plan_are_explained(table: str) -> None:
-    assert set(Plan.model_fields) == {"plan", "base", "impact", "library", "settings"}
+    assert set(DatasetPlan.model_fields) == {"plan", "base", "impact", "library", "settings"}
     assert re.search(rf"^\| `\[+{table}\]+` \|", TEXT, re.M)
 
 

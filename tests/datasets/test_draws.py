@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynresp.datasets.draws import GOES_ON_S, check_durations, draw_sample
-from dynresp.datasets.plan import Plan
+from dynresp.datasets.plan import DatasetPlan
 from dynresp.datasets.plan_reading import parse_plan
 from dynresp.errors import SpecError
 from dynresp.motion.character import Character
@@ -17,7 +17,7 @@ from .samples import plan
 DURATIONS = (12.0, 5.0)
 
 
-def planned(*impacts: dict[str, object], bases: int = 1) -> Plan:
+def planned(*impacts: dict[str, object], bases: int = 1) -> DatasetPlan:
     return parse_plan(
         {
             "plan": {"name": "x", "count": 1},

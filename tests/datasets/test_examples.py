@@ -7,7 +7,7 @@ import pytest
 from dynresp.datasets.facts import parse_facts
 from dynresp.datasets.plan_reading import read_plan
 from dynresp.datasets.shards import decode, places
-from dynresp.datasets.work import World
+from dynresp.datasets.work import Workshop
 from dynresp.paths import examples_folder
 
 PLANS = examples_folder() / "plans"
@@ -16,11 +16,11 @@ CORE = sorted(file.stem for file in PLANS.glob("*.toml") if not file.stem.starts
 
 def hits(name: str, motions: Path) -> tuple[int, bool]:
     """How many of eight samples are hits, and whether the library is built in."""
-    world = World(read_plan(PLANS / f"{name}.toml"), PLANS, motions)
-    manifest = world.manifest(8)
+    workshop = Workshop(read_plan(PLANS / f"{name}.toml"), PLANS, motions)
+    manifest = workshop.manifest(8)
     facts = parse_facts(manifest)
     place = places(facts.identity, 8, 8)[0]
-    found = decode(world.make(place), facts.layout, place, name)
+    found = decode(workshop.make(place), facts.layout, place, name)
     facts.check(found, name)
     hit = found["outcome"] == facts.outcomes.index("hit")
     return int(hit.sum()), manifest["library"]["built_in"]

@@ -11,11 +11,11 @@ import pytest
 from dynresp.datasets import generate as making
 from dynresp.datasets.generate import Summary, generate
 from dynresp.datasets.manifest import MANIFEST
-from dynresp.datasets.plan import Plan
+from dynresp.datasets.plan import DatasetPlan
 from dynresp.datasets.reading import load_dataset
 from dynresp.datasets.schema import columns
 from dynresp.datasets.shards import Place, decode
-from dynresp.datasets.work import Job, World, load
+from dynresp.datasets.work import Job, Workshop, load
 from dynresp.errors import DynrespError, UsageError
 
 from .samples import files, plan
@@ -28,7 +28,7 @@ def copied(dataset: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(dataset, tmp_path / "copy"))
 
 
-def run(out: Path, what: Plan | None = None, **more: Any) -> Summary:
+def run(out: Path, what: DatasetPlan | None = None, **more: Any) -> Summary:
     # Motions come from an empty folder, which any folder without motions is.
     return generate(what or plan(), out.parent, out, motions=out.parent, **more)
 
@@ -45,12 +45,12 @@ def test_a_dataset_is_made(dataset: Path, tmp_path: Path) -> None:
     assert told[-1] == ("labelling", 20, 20)
 
 
-def test_a_sample_alone_is_the_same_as_among_others(dataset: Path, world: World) -> None:
+def test_a_sample_alone_is_the_same_as_among_others(dataset: Path, workshop: Workshop) -> None:
     data = load_dataset(dataset)
     layout = columns(len(data.facts.feature_names), len(data.facts.classes))
     for index in (0, 7, 13):
         place = Place("alone", 0, index, 1)
-        alone = decode(world.make(place), layout, place, "alone")
+        alone = decode(workshop.make(place), layout, place, "alone")
         for name in ("features", "errors", "label", "exit_frames", "entry_frames", "outcome"):
             assert alone[name].tobytes() == getattr(data, name)[[index]].tobytes(), name
         assert alone["contact_point"].tobytes() == data.contact_point[[index]].tobytes()
@@ -235,7 +235,7 @@ def test_a_wrong_address_is_refused_before_anything(tmp_path: Path) -> None:
     ids=["seed", "size", "impacts"],
 )
 def test_another_dataset_is_refused(
-    copied: Path, dataset: Path, what: Plan, size: int | None, said: str
+    copied: Path, dataset: Path, what: DatasetPlan, size: int | None, said: str
 ) -> None:
     with pytest.raises(UsageError, match=f"holds another dataset; different are {said}"):
         run(copied, what, shard_size=size)
@@ -295,8 +295,8 @@ def test_folders_that_cannot_be(tmp_path: Path) -> None:
         run(tmp_path / "file" / "sub")
 
 
-def test_a_worker_that_has_something_else_refuses(world: World, tmp_path: Path) -> None:
-    job = Job(plan(), tmp_path, tmp_path, world.manifest(8))
+def test_a_worker_that_has_something_else_refuses(workshop: Workshop, tmp_path: Path) -> None:
+    job = Job(plan(), tmp_path, tmp_path, workshop.manifest(8))
     assert load(job).manifest(8) == job.manifest
     other = {**job.manifest, "versions": {**job.manifest["versions"], "mujoco": "3.99"}}
     with pytest.raises(DynrespError, match=r"different there: versions\.mujoco\. Install the same"):
@@ -318,18 +318,18 @@ def test_a_shard_that_came_damaged_is_not_written(
 
 
 def test_diverged_samples_are_kept_and_marked(
-    world: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    workshop: Workshop, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     from dynresp.response.labelling import Labelled
 
-    label = world._labeller.label
+    label = workshop._labeller.label
 
     def diverging(hits: Any) -> Labelled:
         found = label(hits)
         found.outcome[0] = 2
         return found
 
-    monkeypatch.setattr(world._labeller, "label", diverging)
+    monkeypatch.setattr(workshop._labeller, "label", diverging)
     summary = run(tmp_path / "out", shard_size=10)
     assert summary.outcomes["diverged"] == 2
     data = load_dataset(tmp_path / "out")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dynresp.datasets.facts import ManifestError, parse_facts, read_manifest
 from dynresp.datasets.manifest import MANIFEST, differences, identity_of, write_manifest
-from dynresp.datasets.work import World
+from dynresp.datasets.work import Workshop
 from dynresp.errors import UsageError
 from dynresp.response.labelling import OUTCOMES
 
@@ -18,8 +18,8 @@ from .samples import plan
 
 
 @pytest.fixture(scope="module")
-def manifest(world: World) -> dict[str, Any]:
-    return world.manifest(8)
+def manifest(workshop: Workshop) -> dict[str, Any]:
+    return workshop.manifest(8)
 
 
 def test_it_says_what_the_numbers_mean(manifest: dict[str, Any]) -> None:
@@ -46,7 +46,7 @@ def test_it_is_written_and_read(manifest: dict[str, Any], tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST]
 
 
-def test_count_and_name_do_not_decide(manifest: dict[str, Any], world: World) -> None:
+def test_count_and_name_do_not_decide(manifest: dict[str, Any], workshop: Workshop) -> None:
     other = copy.deepcopy(manifest)
     other["count"] = other["plan"]["plan"]["count"] = 99
     other["plan"]["plan"]["name"] = "another"
@@ -142,4 +142,4 @@ def test_whatever_a_manifest_says_it_is_parsed_or_refused(
 
 
 def test_a_world_is_the_same_each_time(manifest: dict[str, Any], tmp_path: Path) -> None:
-    assert World(plan(), tmp_path, tmp_path).manifest(8) == manifest
+    assert Workshop(plan(), tmp_path, tmp_path).manifest(8) == manifest

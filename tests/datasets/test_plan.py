@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.datasets.plan import Plan, plain
+from dynresp.datasets.plan import DatasetPlan, plain
 from dynresp.datasets.plan_reading import parse_plan, read_plan
 from dynresp.errors import SpecError
 from dynresp.experiments.mistakes import MAX_FILE_BYTES
@@ -52,7 +52,7 @@ def test_count_and_seed_of_the_command_line_count() -> None:
 def test_a_plan_in_plain_words_is_the_same_plan(text: str) -> None:
     found = parse_plan(tomllib.loads(text))
     again = json.loads(json.dumps(plain(found)))
-    assert Plan.model_validate(again) == found
+    assert DatasetPlan.model_validate(again) == found
 
 
 @pytest.mark.parametrize(
@@ -109,8 +109,11 @@ def test_lists_of_tables(key: str) -> None:
     content = tomllib.loads(PLAN)
     with pytest.raises(SpecError, match=rf"write \[\[{key}\]\]"):
         parse_plan({**content, key: content[key][0]})
-    with pytest.raises(SpecError, match=rf"expected 1 to 100 tables \[\[{key}\]\], got 0"):
+    with pytest.raises(SpecError, match=rf"{key}: expected at least 1 table \[\[{key}\]\], got 0"):
         parse_plan({**content, key: []})
+    many = [content[key][0]] * 101
+    with pytest.raises(SpecError, match=rf"at most 100 tables \[\[{key}\]\], got 101"):
+        parse_plan({**content, key: many})
     with pytest.raises(SpecError, match=f"{key}: expected"):
         parse_plan({**content, key: 3})
     with pytest.raises(SpecError, match=f"{key} 2: expected a table"):

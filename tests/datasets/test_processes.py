@@ -11,7 +11,7 @@ import pytest
 from dynresp.datasets import processes
 from dynresp.datasets.processes import make_here
 from dynresp.datasets.shards import Place, places
-from dynresp.datasets.work import Job, World
+from dynresp.datasets.work import Job, Workshop
 from dynresp.errors import DynrespError
 
 from .samples import files, plan
@@ -119,8 +119,8 @@ def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.slow
-def test_two_workers_make_the_same_bytes(world: World, dataset: Path, tmp_path: Path) -> None:
-    manifest = world.manifest(8)
+def test_two_workers_make_the_same_bytes(workshop: Workshop, dataset: Path, tmp_path: Path) -> None:
+    manifest = workshop.manifest(8)
     job = Job(plan(), tmp_path, tmp_path, manifest)
     told: list[int] = []
     made = make_here(job, places(manifest["identity"], 20, 8), 2, told.append)
@@ -130,8 +130,8 @@ def test_two_workers_make_the_same_bytes(world: World, dataset: Path, tmp_path: 
 
 
 @pytest.mark.slow
-def test_a_worker_that_lacks_something_says_so(world: World, tmp_path: Path) -> None:
-    manifest = {**world.manifest(8), "features": ["another"]}
+def test_a_worker_that_lacks_something_says_so(workshop: Workshop, tmp_path: Path) -> None:
+    manifest = {**workshop.manifest(8), "features": ["another"]}
     job = Job(plan(), tmp_path, tmp_path, manifest)
     with pytest.raises(DynrespError, match="different there: features"):
         list(make_here(job, places("x", 20, 8), 1, lambda done: None))

@@ -1,7 +1,12 @@
 """Small motions and graphs for the tests of locomotion."""
 
+import functools
+from pathlib import Path
+
 import numpy as np
 
+from dynresp.graphs.building import build_graph
+from dynresp.graphs.plan import find_plan, read_plan
 from dynresp.locomotion.graph.config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import load_builtin
@@ -23,3 +28,10 @@ def walking_motions(character: Character) -> list[Motion]:
 def walking_graph(character: Character, **changes: object) -> MotionGraph:
     """A graph of `walking_motions`."""
     return MotionGraph.build(walking_motions(character), GraphConfig(**changes), character)  # type: ignore[arg-type]
+
+
+@functools.cache
+def planned_graph(name: str, folder: Path, character: Character) -> MotionGraph:
+    """The graph of a plan that comes with the product, of real motion capture; built once."""
+    path = find_plan(name)
+    return build_graph(read_plan(path), [folder], path.parent, character, lambda *_: None)

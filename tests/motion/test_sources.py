@@ -109,6 +109,24 @@ def test_listing_keeps_motion_files_only(tmp_path: Path) -> None:
     listed = [path.relative_to(tmp_path).as_posix() for path in sources.list_motion_files(tmp_path)]
     deeper = [f"sub/deeper/{name}" for name in ("A.BVH", "b.bvh", "c.amc", "d.npz")]
     assert listed == ["deep.json", "deep.txt", *deeper]
+    above = [path.name for path in sources.list_motion_files(tmp_path, levels=1)]
+    assert above == ["deep.json", "deep.txt"]
+    assert len(sources.list_motion_files(tmp_path, levels=2)) == 2
+    assert len(sources.list_motion_files(tmp_path, levels=3)) == 6
+
+
+@pytest.mark.parametrize(
+    ("path", "pattern", "fits"),
+    [
+        ("a/b.bvh", "a/*.bvh", True),
+        ("a/b.bvh", "*/b.[bc]vh", True),
+        ("a/b.bvh", "*.bvh", False),
+        ("a/c/b.bvh", "a/*.bvh", False),
+        ("a/b.BVH", "a/*.bvh", False),
+    ],
+)
+def test_wildcards_stand_for_no_slash(path: str, pattern: str, fits: bool) -> None:
+    assert sources.fits_pattern(path, pattern) == fits
 
 
 def test_listing_a_missing_folder_is_refused(tmp_path: Path) -> None:

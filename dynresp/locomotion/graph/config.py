@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from numbers import Real
 
 from dynresp.errors import UsageError
 
@@ -24,6 +27,22 @@ class Coordinates(Enum):
 # Rates [1/s] and times of blending [s] outside of these make no motion; the rest must be finite.
 _RANGES = {"fps": (1.0, 240.0), "blend_s": (0.01, 10.0), "blend_rate_s": (0.01, 10.0)}
 _GREATEST = sys.float_info.max
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+# What the fields may hold, by the type they are declared with, and what it is called.
+_KINDS: dict[str, tuple[Callable[[object], bool], str]] = {
+    "float": (_is_number, "a number"),
+    "bool": (lambda value: isinstance(value, bool), "True or False"),
+    "bool | None": (lambda value: value is None or isinstance(value, bool), "True, False or None"),
+    "Coordinates": (
+        lambda value: isinstance(value, Coordinates),
+        "one of " + ", ".join(str(one) for one in Coordinates),
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -74,8 +93,13 @@ class GraphConfig:
         """Check the numbers.
 
         Raises:
-            UsageError: One of them makes no sense.
+            UsageError: One of them makes no sense, or is of another type.
         """
+        for field in dataclasses.fields(self):
+            right, expected = _KINDS[str(field.type)]
+            value = getattr(self, field.name)
+            if not right(value):
+                raise UsageError(f"{field.name} must be {expected}, got {value!r:.60}")
         # Compared, not asked whether they are finite: that fails on whole numbers beyond a float.
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name)

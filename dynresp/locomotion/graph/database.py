@@ -12,12 +12,10 @@ import numpy.typing as npt
 
 from dynresp.errors import MotionError
 from dynresp.locomotion.graph import placement
+from dynresp.motion.arrays import BoolArray, IntArray, frozen
 from dynresp.motion.character import POSE_SIZE, VELOCITY_SIZE, Character
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
-
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int32]
 
 CONTACTS = ("left foot", "right foot", "left hand", "right hand")
 """What the columns of contacts stand for; a database has the first two, or all four."""
@@ -109,8 +107,14 @@ class MotionDatabase:
             owed_to: `credits` of the database.
 
         Raises:
-            MotionError: There is no motion long enough.
+            MotionError: What was given are no motions, or there is none long enough.
         """
+        listed = isinstance(motions, Sequence)
+        if not listed or not all(isinstance(motion, Motion) for motion in motions):
+            raise MotionError(
+                f"a motion database is made of a list of Motion objects, got {motions!r:.60}; "
+                "files are read by dynresp.motion.load.load_motion"
+            )
         given = [m.contacts for m in motions] if contacts is None else list(contacts)
         if len(given) != len(motions) or any(
             len(c) != len(m) for c, m in zip(given, motions, strict=True)
@@ -165,31 +169,31 @@ class MotionDatabase:
             out[clip.start : clip.stop] = pose_velocities(
                 self.poses[clip.start : clip.stop], self.fps
             )
-        return _frozen(out)
+        return frozen(out)
 
     @functools.cached_property
     def planar(self) -> FloatArray:
         """(n, 4) position [m] and yaw [rad] of the root, frame by frame."""
-        return _frozen(placement.of_poses(self.poses))
+        return frozen(placement.of_poses(self.poses))
 
     @functools.cached_property
     def clip_of(self) -> IntArray:
         """(n,) the clip to which each frame belongs."""
         lengths = [clip.stop - clip.start for clip in self.clips]
-        return _frozen(np.repeat(np.arange(len(self.clips), dtype=np.int32), lengths))
+        return frozen(np.repeat(np.arange(len(self.clips), dtype=np.int32), lengths))
 
     @functools.cached_property
     def successors(self) -> IntArray:
         """(n,) the frame recorded after each, -1 at the end of a clip."""
         following = np.arange(1, len(self) + 1, dtype=np.int32)
         following[[clip.stop - 1 for clip in self.clips]] = -1
-        return _frozen(following)
+        return frozen(following)
 
     @functools.cached_property
     def contact_states(self) -> npt.NDArray[np.uint8]:
         """(n,) contacts as one number: bit k is set where `contacts[:, k]` is."""
         bits = np.left_shift(1, np.arange(self.contacts.shape[1]))
-        return _frozen((self.contacts @ bits).astype(np.uint8))
+        return frozen((self.contacts @ bits).astype(np.uint8))
 
     def motion(self, clip: int) -> Motion:
         """A clip as a motion, in its own world."""
@@ -207,8 +211,3 @@ def motion_identity(motion: Motion, contacts: BoolArray) -> str:
     rounded = (np.round(motion.poses, 9) + 0.0).astype("<f8")
     content = (rounded.tobytes(), np.packbits(contacts).tobytes(), f"{motion.fps:.9g}".encode())
     return hashlib.sha256(b"|".join(content)).hexdigest()[:16]
-
-
-def _frozen(array: npt.NDArray) -> npt.NDArray:  # type: ignore[type-arg]
-    array.flags.writeable = False
-    return array

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit, types
 
 from dynresp.compiling import compiled
+from dynresp.growing import doubled
 
 LANES = 16
 """Rotations of a frame, filled up with the identity: one vector."""
@@ -81,14 +82,6 @@ def _sketched(sketch, own, start, count, sums):  # type: ignore[no-untyped-def]
             sums[t] = part if d == 0 else sums[t] + part
 
 
-@njit(inline="always")
-def _doubled(array):  # type: ignore[no-untyped-def]
-    """An array with room for twice as many, its contents in front."""
-    longer = np.empty(2 * len(array), array.dtype)
-    longer[: len(array)] = array
-    return longer
-
-
 @compiled(_SIGNATURE, fastmath=_FASTMATH)
 def close_pairs(  # type: ignore[no-untyped-def]
     first,
@@ -151,7 +144,7 @@ def close_pairs(  # type: ignore[no-untyped-def]
                 candidates[left] = start + t
                 left += sums[t] <= bound
             if found + left > len(columns):
-                columns, distances = _doubled(columns), _doubled(distances)
+                columns, distances = doubled(columns), doubled(distances)
             for t in range(left):
                 place = candidates[t]
                 b = packed[place]

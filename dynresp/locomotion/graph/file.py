@@ -29,6 +29,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,8 @@ def load_graph(path: str | Path, character: Character | None = None) -> MotionGr
         GraphFileError: The file cannot be opened, is damaged or out of bounds, or belongs to
             another format version or another character.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise GraphFileError(f"a graph file is named by text or a Path, got {path!r:.60}")
     path = Path(path)
     arrays = FORMAT.read(path)
     character = character or default_character()

@@ -17,8 +17,9 @@ import numpy.typing as npt
 from dynresp.errors import MotionError
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import BoolArray, IntArray, MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.motion import legs, rotations
+from dynresp.motion.arrays import BoolArray, IntArray, frozen
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.contact_cases import ContactCase, contact_cases
 from dynresp.motion.motion import FEET, Motion
@@ -169,7 +170,7 @@ class MotionGraph:
     def sources(self) -> IntArray:
         """(m,) the frame from which each way leads."""
         frames = np.arange(len(self.database), dtype=np.int32)
-        return _frozen(np.repeat(frames, np.diff(self.offsets)))
+        return frozen(np.repeat(frames, np.diff(self.offsets)))
 
     @functools.cached_property
     def probabilities(self) -> FloatArray:
@@ -178,7 +179,7 @@ class MotionGraph:
         lengths = np.diff(self.offsets)
         filled = np.flatnonzero(lengths)
         sums = np.add.reduceat(weights, self.offsets[filled])
-        return _frozen(weights / np.repeat(sums, lengths[filled]))
+        return frozen(weights / np.repeat(sums, lengths[filled]))
 
     @functools.cached_property
     def cumulative(self) -> FloatArray:
@@ -187,17 +188,17 @@ class MotionGraph:
         before = np.concatenate([[0.0], sums])[self.offsets[self.sources]]
         along = np.minimum(sums - before, 1.0)
         along[self.offsets[1:][np.diff(self.offsets) > 0] - 1] = 1.0
-        return _frozen(along)
+        return frozen(along)
 
     @functools.cached_property
     def frames(self) -> IntArray:
         """(k,) frames of the component, ascending."""
-        return _frozen(np.flatnonzero(np.diff(self.offsets)).astype(np.int32))
+        return frozen(np.flatnonzero(np.diff(self.offsets)).astype(np.int32))
 
     @functools.cached_property
     def placements(self) -> FloatArray:
         """(m, 4) where the clip of a way's target is put, seen from the clip of its source."""
-        return _frozen(self.placement_between(self.sources, self.targets))
+        return frozen(self.placement_between(self.sources, self.targets))
 
     def placement_between(self, sources: npt.ArrayLike, targets: npt.ArrayLike) -> FloatArray:
         """Where the clip of a target is put, seen from the clip of the frame before it.
@@ -321,8 +322,3 @@ def _rows(
     np.cumsum(np.bincount(all_sources, minlength=len(successors)), out=offsets[1:])
     all_distances = np.concatenate([np.zeros(len(own), dtype=np.float32), distances])
     return offsets, all_targets[order].astype(np.int32), all_distances[order]
-
-
-def _frozen(array: npt.NDArray) -> npt.NDArray:  # type: ignore[type-arg]
-    array.flags.writeable = False
-    return array

@@ -34,8 +34,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import IntArray, MotionDatabase
+from dynresp.locomotion.graph.database import MotionDatabase
 from dynresp.locomotion.graph.distance import FrameFeatures, frame_features, quarter_turned
+from dynresp.motion.arrays import IntArray
 
 _Single = npt.NDArray[np.float32]
 _Long = npt.NDArray[np.int64]

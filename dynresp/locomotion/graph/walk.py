@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dynresp.errors import UsageError
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.arrays import IntArray
 
 
 def random_walk(

@@ -13,6 +13,17 @@ def made(rng: np.random.Generator, frames: int, fps: float = 30.0, name: str = "
 
 
 class TestGather:
+    @pytest.mark.parametrize("given", ["abc", ["abc"], 3, None])
+    def test_what_are_no_motions_is_refused(self, character: Character, given: object) -> None:
+        with pytest.raises(MotionError, match="list of Motion objects, got"):
+            MotionDatabase.gather(given, character)  # type: ignore[arg-type]
+
+    def test_one_motion_alone_is_no_list(
+        self, rng: np.random.Generator, character: Character
+    ) -> None:
+        with pytest.raises(MotionError, match="list of Motion objects, got Motion"):
+            MotionDatabase.gather(made(rng, 9), character)  # type: ignore[arg-type]
+
     def test_lays_clips_end_to_end(self, rng: np.random.Generator, character: Character) -> None:
         motions = [made(rng, 40, name="a"), made(rng, 31, name="b")]
         database = MotionDatabase.gather(motions, character, 15.0)

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -371,3 +372,23 @@ def test_a_higher_rate_makes_a_finer_graph(character: Character) -> None:
     check_rows(fine)
     assert len(fine.database) == pytest.approx(2 * len(coarse.database), abs=8)
     assert fine.database.fps == 30.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"fps": "15"}, "fps must be a number, got '15'"),
+        ({"sigma": None}, "sigma must be a number, got None"),
+        ({"blend_s": True}, "blend_s must be a number, got True"),
+        ({"mirrored": "no"}, "mirrored must be True or False, got 'no'"),
+        ({"local_maxima": 1}, "local_maxima must be True, False or None, got 1"),
+        ({"coordinates": "fixed"}, "coordinates must be one of Coordinates.RELATIVE, .*'fixed'"),
+    ],
+)
+def test_settings_of_another_type_are_refused(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        GraphConfig(**wrong)
+
+
+def test_settings_may_be_numbers_of_numpy() -> None:
+    assert GraphConfig(fps=np.float32(30.0), sigma=np.int64(1)).fps == 30.0  # type: ignore[arg-type]

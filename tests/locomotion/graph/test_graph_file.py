@@ -201,3 +201,8 @@ def test_damaged_files_are_refused(file: Path) -> None:
 
 def test_bounds_are_told() -> None:
     assert FORMAT.problem("targets", "<i4", (60_000_000,)) is not None
+
+
+def test_what_names_no_file_is_refused() -> None:
+    with pytest.raises(GraphFileError, match="named by text or a Path, got 3"):
+        load_graph(3)  # type: ignore[arg-type]

@@ -7,19 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynresp.bench.graph_steps import at_jumps, source_limits
 from dynresp.graphs.building import build_graph
 from dynresp.graphs.plan import find_plan, read_plan
-from dynresp.locomotion.graph.database import IntArray
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.playing.composing import compose
-from dynresp.motion import rotations
+from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
-from dynresp.motion.rotations import FloatArray
 from dynresp.motion.skating import foot_skates
-from dynresp.response.quality import joint_speed_steps
 
 pytestmark = pytest.mark.slow
 
@@ -50,32 +48,6 @@ def walk(request: pytest.FixtureRequest) -> Walk:
     start = time.perf_counter()
     path = random_walk(graph, FRAMES, rng)
     return Walk(graph, path, time.perf_counter() - start)
-
-
-def speed_steps(motion: Motion) -> FloatArray:
-    """Changes of velocity at frames 1 to n - 2 (n - 2, 3).
-
-    Columns: the joint that changes most [rad/s], the root [m/s], its turning [rad/s].
-    """
-    velocities = np.diff(motion.root_positions, axis=0) * motion.fps
-    q = motion.root_quaternions
-    turns = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
-    changes = [np.diff(rows, axis=0) for rows in (velocities, turns * motion.fps)]
-    root, turn = (np.linalg.norm(rows, axis=1) for rows in changes)
-    return np.column_stack([joint_speed_steps(motion).max(axis=1), root, turn])
-
-
-def source_limits(graph: MotionGraph) -> FloatArray:
-    """(3,) 99.9th percentiles of the speed steps of what was recorded."""
-    clips = [graph.database.motion(clip) for clip in range(len(graph.database.clips))]
-    return np.percentile(np.concatenate([speed_steps(clip) for clip in clips]), 99.9, axis=0)
-
-
-def at_jumps(motion: Motion, jumps: np.ndarray) -> FloatArray:
-    """Speed steps at the frames left and at those entered."""
-    rows = np.concatenate([jumps - 2, jumps - 1])
-    steps = speed_steps(motion)
-    return steps[rows[(rows >= 0) & (rows < len(steps))]]
 
 
 def test_a_million_frames_follow_the_ways_and_never_end(walk: Walk) -> None:
