@@ -19,9 +19,9 @@ from dynresp.motion.foot_fitting import Composed, FitConfig, fit_feet
 from dynresp.motion.motion import Motion, interpolate_moving
 from dynresp.motion.rotations import FloatArray
 
-MOST_FRAMES = 1_000_000
-"""So many frames are composed at once: an hour at 240 a second. The motion is held in memory four
-times over meanwhile, in 2 GB."""
+MOST_FRAMES = 500_000
+"""So many frames are composed at once: an hour at 120 a second takes 432,000. The motion is held in
+memory about eight times over meanwhile (measured), in 2 GB at most."""
 
 # A frame so near to a knot is on it, as part of the way between two.
 _ON = 1e-6
