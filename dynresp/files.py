@@ -25,10 +25,13 @@ def replacing(path: Path | str) -> Iterator[Path]:
         Where to write.
 
     Raises:
-        DynrespError: The folder cannot be made or the file cannot be written.
+        DynrespError: The folder cannot be made or the file cannot be written, or there is a device
+            or a pipe, whose place a file would take.
         OSError: The block's, where it is about another file.
     """
     target = Path(path)
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        raise DynrespError(f"cannot write {target}: it is a device or a pipe; name a file")
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

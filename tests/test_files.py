@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -58,3 +59,10 @@ def test_a_folder_of_that_name(tmp_path: Path) -> None:
     with pytest.raises(DynrespError, match="cannot write"), replacing(tmp_path / "x") as temporary:
         temporary.touch()
     assert [path.name for path in tmp_path.iterdir()] == ["x"]
+
+
+def test_a_pipe_stays_one(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(DynrespError, match="a device or a pipe"), replacing(tmp_path / "pipe"):
+        pass
+    assert (tmp_path / "pipe").is_fifo()

@@ -8,6 +8,7 @@ import numpy as np
 
 from dynresp.bench.graph_figures import FLAT, Measurement, Value
 from dynresp.bench.graph_steps import COLUMNS, UNITS, at_jumps, source_limits, source_limits_at
+from dynresp.errors import UsageError
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import place_poses
 from dynresp.locomotion.graph.walk import random_walk
@@ -34,10 +35,15 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
         character: The character.
         count: Frames, 3 at least.
         seed: Of the walk.
+
+    Raises:
+        UsageError: The walk is too short to hold a stance and a jump.
     """
     path = random_walk(graph, count, np.random.default_rng(seed))
     own, shown = (_Seen.of(graph, character, path, fps) for fps in (graph.config.fps, SHOWN_FPS))
     slides, steps = own.slides, own.steps
+    if not (own.whole and shown.whole):
+        raise UsageError(f"{count} frames hold no stance or no jump; give a larger --count")
     limits = source_limits(graph)
     shown_limits = source_limits_at(graph, character, SHOWN_FPS)
     below = np.mean(shown.steps[FITTED] <= shown_limits, axis=0)
@@ -61,6 +67,11 @@ class _Seen:
 
     slides: dict[str, FloatArray]
     steps: dict[str, FloatArray]
+
+    @property
+    def whole(self) -> bool:
+        """Whether a stance and a jump were seen."""
+        return all(len(rows.get(FITTED, ())) for rows in (self.slides, self.steps))
 
     @classmethod
     def of(cls, graph: MotionGraph, character: Character, path: IntArray, fps: float) -> _Seen:

@@ -137,7 +137,7 @@ def run(
         baseline=constant,
         baseline_name="always the most frequent cluster",
         ratio=value / constant,
-        machine=describe_machine(("numpy", "numba", "sklearn", "cv2")),
+        machine=describe_machine(("numpy", "numba", "scikit-learn", "opencv-python-headless")),
         more=more,
         notes=(
             "Measured: choices that lead to where the actor was within the last second, the mean "

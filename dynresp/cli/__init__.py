@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 
 from dynresp.cli.interruption import INTERRUPTED, Interruption
 
@@ -45,4 +46,6 @@ def _run() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
+    # A name in letters that the pictures' typeface lacks shows boxes there; that is no error.
+    warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font", UserWarning)
     app(prog_name="dynresp")

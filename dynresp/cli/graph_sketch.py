@@ -77,6 +77,14 @@ def sketch(
     check_folder(out)
     with progress() as tell:
         outing = sketch_outing(loaded, default_character(), asked, boxes, fps, tell)
+    # Over terrain there is no such figure; nor is there one of a goal.
+    off = outing.about.get("sketch", {}).get("off_sketch_worst_m")
+    if off is not None and off > _MISSED_M:
+        why = "; obstacles stand there" if boxes is not None or maze else ""
+        typer.echo(
+            f"dynresp: to a corner of the path sketched it comes no nearer than {off:.1f} m{why}",
+            err=True,
+        )
     finish(out, loaded, outing, video, as_json)
 
 
@@ -98,6 +106,8 @@ def read_points(text: str | None, file: Path | None) -> FloatArray | None:
     return _corners(rows, f"--path: {file}")
 
 
+# Farther from the walk than this a corner is told to be missed [m].
+_MISSED_M = 1.0
 # Largest file of corners that is read [bytes]; and how far corners may be away [m].
 _MOST_BYTES = 1 << 20
 _FARTHEST = 10_000.0

@@ -61,6 +61,11 @@ def walk(
         raise UsageError("--choices has the answers that --choose asks for; leave out one of them")
     if balls and (choose or answers is not None):
         raise UsageError("--balls goes with a walk by chance; leave out --choose and --choices")
+    if balls and fps != USUAL_FPS:
+        raise UsageError(
+            f"--balls: what is simulated is written at {USUAL_FPS:g} frames a second, not at "
+            f"{fps:g}; leave out --fps"
+        )
     loaded = load_graph(graph)
     if balls or choose or answers is not None:
         refuse_blocks(loaded)
@@ -97,7 +102,7 @@ def walk(
     outing = Outing.of(
         composition,
         loaded,
-        title=f"A walk by chance through {graph.name}",
+        title=f"A walk by chance through {graph.name.encode(errors='replace').decode()}",
         subtitle=f"{composition.motion.duration:.0f} s, {len(composition.jumps)} jumps, "
         f"seed {seed or 0}",
         about={"seed": seed or 0},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -95,8 +95,11 @@ def watch(
             length=opened.length,
             seed=seed or 0,
             stop=stop,
+            ended=stop.ended,
         )
-        outing, pace = watch_outing(loaded, character, sight, pictures, asked, fps, tell)
+        outing, pace = watch_outing(
+            loaded, character, sight, pictures, asked, fps, tell, remarks.append
+        )
     for remark in remarks:
         typer.echo(f"dynresp: {remark}", err=True)
     said = f"{pace.choices} choices, {pace.choices_per_s:.0f} a second of computing (10 are due)"
@@ -106,7 +109,7 @@ def watch(
 class Stop:
     """Ctrl-C ends the watching, and the program goes on to write what came of it.
 
-    Before the watching has begun, and the second time, it interrupts as ever.
+    Before the watching has begun, after it has ended, and the second time, it interrupts as ever.
     """
 
     def __init__(self) -> None:
@@ -119,6 +122,10 @@ class Stop:
         self._watching = True
         return self._came
 
+    def ended(self) -> None:
+        """No more is watched."""
+        self._watching = False
+
     def handle(self, number: int, frame: FrameType | None) -> None:
         """Take in a signal."""
         if self._watching and not self._came:
@@ -128,7 +135,7 @@ class Stop:
 
 
 @contextmanager
-def stopping(live: bool) -> Iterator[Callable[[], bool]]:
+def stopping(live: bool) -> Iterator[Stop]:
     """Asked during the block, tells whether somebody wants a camera to be left.
 
     Args:

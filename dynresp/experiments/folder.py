@@ -14,6 +14,8 @@ from typing import get_args
 from dynresp.errors import DynrespError
 from dynresp.experiments.spec import Artefact
 
+PLAN, OPTIONS, WATCHING = "plan.png", "options.png", "watching.png"
+"""Pictures of a way through a motion graph, of the actions offered, of the video followed."""
 RESULT, SUMMARY, TABLE = "result.json", "summary.json", "table.csv"
 
 WRITTEN = "written"
@@ -22,7 +24,7 @@ _NOT_TO_BE_HAD = "not written: "
 _FAILED = "failed: "
 
 _ARTEFACTS: tuple[str, ...] = get_args(Artefact)
-_OF_A_RESPONSE = (RESULT, *_ARTEFACTS)
+_OF_A_RESPONSE = (RESULT, *_ARTEFACTS, PLAN, OPTIONS, WATCHING)
 _HIT = re.compile(r"hit_\d{5,}")
 
 

@@ -112,7 +112,9 @@ def write_json(content: dict[str, Any], path: Path) -> None:
 
 def to_json(content: dict[str, Any]) -> str:
     """An object as JSON: floats to six decimals, null for those that are not finite."""
-    return json.dumps(_plain(content), indent=2, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(_plain(content), indent=2, allow_nan=False, ensure_ascii=False)
+    # Names of files need not be UTF-8, which JSON is.
+    return text.encode(errors="replace").decode()
 
 
 def _plain(value: Any) -> Any:

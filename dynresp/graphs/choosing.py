@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynresp.experiments.folder import OPTIONS
 from dynresp.graphs.outing import Outing
 from dynresp.graphs.worlds import play_in_world
 from dynresp.locomotion.choice.actions import OfferedAction, choices
@@ -18,9 +19,6 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import wrapped
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.motion.character import Character
-
-OPTIONS = "options.png"
-"""The picture of the actions that were offered last."""
 
 # Without a pick it walks on for so long [s] before it asks again.
 _ON_S = 2.0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.experiments.folder import RESULT, WRITTEN, clear_response
+from dynresp.experiments.folder import PLAN, RESULT, WRITTEN, clear_response
 from dynresp.experiments.result import versions, write_json
 from dynresp.experiments.story_files import Writer, story_writers, write_files
 from dynresp.graphs.worlds import standing_about
@@ -24,7 +24,6 @@ from dynresp.progress import Progress
 from dynresp.response.quality import joint_speed_steps
 from dynresp.view.story import Block, GroundPath, MovingSphere, Story, StoryEvent, StoryPhase
 
-PLAN = "plan.png"
 FILES = ("motion.npz", "motion.bvh", "recording.html", "filmstrip.png", PLAN, "video.mp4")
 """What is written of an outing besides `result.json`."""
 

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from dynresp.archive import TEXT, ArchiveFormat, text_array
+from dynresp.archive import TEXT, ArchiveFormat, Arrays, text_array
 from dynresp.errors import DynrespError, GraphFileError
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.clusters.grouping import Clusters
@@ -24,7 +24,7 @@ from dynresp.locomotion.graph.file import graph_identity
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.vision.features import FeatureConfig
 from dynresp.locomotion.vision.recognition import Recogniser
-from dynresp.locomotion.vision.sight import cluster_by_sight
+from dynresp.locomotion.vision.sight import OBSERVED, cluster_by_sight
 from dynresp.locomotion.vision.silhouettes import Viewpoints
 from dynresp.locomotion.vision.table import ViewTable, table_identity
 from dynresp.motion.character import Character
@@ -64,6 +64,10 @@ FORMAT = ArchiveFormat(
 
 # Frames that something can be ago.
 _MOST_AGE = 10_000
+# Squares and products of larger numbers overflow.
+_LARGEST = 1e100
+# What rounding adds to the logarithm of a probability.
+_ROUNDING = 1e-3
 
 _Made = TypeVar("_Made")
 
@@ -184,7 +188,7 @@ def load_actions(
     frames, count, width = len(graph.database), len(a["weights"]), len(a["first_biases"])
     seen = len(a["ages"]) * table.rows.shape[2]
     shapes = {
-        "means": (count, a["means"].shape[1]),
+        "means": (count, OBSERVED),
         "variances": (count,),
         "labels": (frames,),
         "log_probabilities": (frames, count),
@@ -194,11 +198,10 @@ def load_actions(
         "last_biases": (count,),
     }
     whole = count > 0 and all(a[name].shape == shape for name, shape in shapes.items())
-    # A bias may be minus infinity: that of a cluster to which no frame belongs.
-    finite = all(np.isfinite(a[name]).all() for name in ("weights", "means", "variances"))
-    finite &= all(not np.isnan(x).any() for x in a.values() if x.dtype.kind == "f")
-    if not (whole and finite and _within(a["labels"], count) and a["variances"].min() > 0.0):
+    if not (whole and _within(a["labels"], count)):
         FORMAT.fail(path, "does not hold actions: its arrays do not fit together")
+    if not _plausible(a):
+        FORMAT.fail(path, "does not hold actions: some of its numbers make no sense")
     if not (np.isin(a["examples"], graph.frames).all() and _within(a["ages"], _MOST_AGE)):
         FORMAT.fail(path, "does not hold actions: it names frames that are not there")
     clusters = Clusters(
@@ -214,6 +217,26 @@ def load_actions(
         a["ages"], (a["first_weights"], a["last_weights"]), (a["first_biases"], a["last_biases"])
     )
     return clusters, recogniser
+
+
+def _plausible(a: Arrays) -> bool:
+    """Whether numbers are what learning can give, in arrays that fit together."""
+    # A bias may be minus infinity: that of a cluster to which no frame belongs.
+    biases, logs = a["last_biases"], a["log_probabilities"]
+    biases = biases[biases != -np.inf]
+    finite = [a[x] for x in ("weights", "means", "variances", "curve")]
+    finite += [a[x] for x in ("first_weights", "first_biases", "last_weights")]
+    likeliest = logs.max(axis=1)
+    return bool(
+        all((np.abs(numbers) <= _LARGEST).all() for numbers in [*finite, biases])
+        and len(biases)
+        and a["weights"].min() >= 0.0
+        and a["variances"].min() > 0.0
+        and a["spacing"] >= 1
+        and not np.isnan(logs).any()
+        and np.isfinite(likeliest).all()
+        and likeliest.max() <= _ROUNDING
+    )
 
 
 def _within(numbers: np.ndarray, end: int) -> bool:

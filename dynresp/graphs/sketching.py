@@ -20,7 +20,9 @@ from dynresp.locomotion.sketch.search import SearchGraph
 from dynresp.locomotion.sketch.walking import SketchedWalk
 from dynresp.locomotion.worlds.maze import random_maze
 from dynresp.locomotion.worlds.obstacles import World
+from dynresp.locomotion.worlds.paths import distances_to
 from dynresp.motion.character import Character
+from dynresp.motion.rotations import FloatArray
 from dynresp.progress import Progress
 from dynresp.view.story import GroundPath
 
@@ -108,7 +110,7 @@ def sketch_outing(
         paths=drawn,
         bounds=None if world is None else world.bounds,
         arrived=walk.arrived,
-        about={"sketch": _about(walk, seconds), "maze": asked.seed if asked.maze else None},
+        about={"sketch": _about(walk, path, seconds), "maze": asked.seed if asked.maze else None},
     )
 
 
@@ -143,15 +145,20 @@ def _refuse_inside(world: World, place: tuple[float, float], what: str) -> None:
         )
 
 
-def _about(walk: SketchedWalk, seconds: float) -> dict[str, Any]:
+def _about(walk: SketchedWalk, sketch: FloatArray | None, seconds: float) -> dict[str, Any]:
     """What `result.json` says of a walk along a sketch.
 
     The time that planning took is left out: the same command gives the same bytes.
     """
+    off_sketch = None
+    if sketch is not None:
+        off_sketch = float(distances_to(walk.roots[:, :2], sketch).max())
     return {
         "arrived": walk.arrived,
         "off_path_mean_m": float(walk.off_path.mean()),
         "off_path_worst_m": float(walk.off_path.max()),
+        # The path walked along is bent around obstacles; this tells how far corners were missed.
+        "off_sketch_worst_m": off_sketch,
         "walking_s": seconds,
         "ways_looked_at": walk.looked,
         "ways_dropped_for_collisions": walk.collided,

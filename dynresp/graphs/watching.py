@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from dynresp.errors import DynrespError, MotionFileError, UsageError
+from dynresp.experiments.folder import WATCHING
 from dynresp.graphs.outing import Outing
 from dynresp.graphs.sight_file import Sight
-from dynresp.graphs.worlds import TERRAIN
+from dynresp.graphs.worlds import TERRAIN, play_in_world
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import wrapped
-from dynresp.locomotion.playing.composing import compose
 from dynresp.locomotion.vision.control import VideoControl
 from dynresp.locomotion.vision.following import Followed, follow
 from dynresp.locomotion.vision.segmentation import Picture, SegmentationConfig
@@ -25,11 +26,10 @@ from dynresp.motion.character import Character
 from dynresp.progress import Progress
 from dynresp.view.watch_view import Seen, TimeLine, Watched, letter, write_watched
 
-WATCHING = "watching.png"
-"""The picture of what was seen and what the avatar did."""
-
 # A video must go on for so long after the empty room [s].
 _LEAST_S = 0.5
+# So many pictures fewer than a file says are no damage: some count what cannot be shown.
+_FEW = 5
 # Mean speeds below count as standing [m/s].
 _STANDING = 0.25
 # Turns below count as none [deg/s].
@@ -49,6 +49,7 @@ class VideoAsked:
         length: Pictures it has; None where that is not known.
         seed: Of where the avatar begins, and of what it does while it sees nobody.
         stop: Whether to stop; asked before each picture, once there is something to follow.
+        ended: Told when no more pictures are waited for.
     """
 
     name: str
@@ -57,6 +58,7 @@ class VideoAsked:
     length: int | None
     seed: int
     stop: Callable[[], bool]
+    ended: Callable[[], None]
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ def watch_outing(
     asked: VideoAsked,
     fps: float,
     progress: Progress,
+    remark: Callable[[str], None],
 ) -> tuple[Outing, Pace]:
     """Follow somebody.
 
@@ -108,6 +111,7 @@ def watch_outing(
         asked: What is watched.
         fps: Frame rate of the motion [1/s].
         progress: Told how far it has come.
+        remark: Told of a video that ends before it should.
 
     Raises:
         MotionFileError: The video is too short.
@@ -130,7 +134,10 @@ def watch_outing(
         slowest = max(slowest, now - before - reel.waited_since())
         before = now
     worked = time.perf_counter() - begun - reel.waited_s
-    _check_length(asked, reel.count / asked.fps)
+    missing = _missing(asked, reel.count)
+    _check_length(asked, reel.count, missing)
+    if missing:
+        remark(f"{asked.name}: {missing}")
     if not any(step.told is not None for step in steps):
         raise DynrespError(
             f"nobody is seen in {asked.name}, {steps[-1].time_s:.1f} s; the first second has to "
@@ -150,17 +157,35 @@ def _compiled(sight: Sight, start: int) -> None:
     trial.choose(start)
 
 
-def _check_length(asked: VideoAsked, seconds: float) -> None:
+def _missing(asked: VideoAsked, count: int) -> str:
+    """What is to be said of a file that ends before it should; nothing of others."""
+    if asked.length is None or count + _FEW >= min(asked.length, _most(asked)):
+        return ""
+    return (
+        f"{count} of the {asked.length} pictures that the file says it has can be read; it may be "
+        "damaged or cut short"
+    )
+
+
+def _most(asked: VideoAsked) -> int:
+    """Pictures that are watched at most."""
+    return round(asked.seconds * asked.fps)
+
+
+def _check_length(asked: VideoAsked, count: int, missing: str) -> None:
     """Refuse a video that is over before there is anything to follow.
 
     Raises:
         MotionFileError: It is too short.
     """
     empty = SegmentationConfig().empty_s
+    seconds = count / asked.fps
     if seconds < empty + _LEAST_S:
+        # Rounded down, so that what is too short never reads as long enough.
+        said = "1 picture" if count == 1 else f"{math.floor(100 * seconds + 1e-6) / 100:.2f} s"
         raise MotionFileError(
-            f"{asked.name}: {seconds:.1f} s of video; the first {empty:g} s show the room alone, "
-            f"so expected at least {empty + _LEAST_S:g} s"
+            f"{asked.name}: {said} of video; the first {empty:g} s show the room alone, "
+            f"so expected at least {empty + _LEAST_S:g} s" + (f"; {missing}" if missing else "")
         )
 
 
@@ -185,10 +210,14 @@ class _Reel:
         self._every, self._steps = 2, 0
 
     def __iter__(self) -> Iterator[Picture]:
+        yield from self._until_the_end()
+        self._asked.ended()
+
+    def _until_the_end(self) -> Iterator[Picture]:
         asked = self._asked
         empty_s = SegmentationConfig().empty_s
         room = "learning the empty room, nobody may be in the picture"
-        most = round(asked.seconds * asked.fps)
+        most = _most(asked)
         length = most if asked.length is None else min(most, asked.length)
         while self.count < most:
             if self.count > (empty_s + _LEAST_S) * asked.fps and asked.stop():
@@ -239,7 +268,7 @@ def _outing(
 ) -> Outing:
     """What was watched as an outing."""
     path = np.concatenate([[start], *(step.frames for step in steps)]).astype(np.int32)
-    composition = compose(graph, character, path, fps=fps)
+    composition = play_in_world(graph, character, path, fps)
     clusters = sight.forest.clusters
     played = np.cumsum([len(step.frames) for step in steps])
     times = [step.time_s for step in steps]

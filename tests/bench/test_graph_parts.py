@@ -22,7 +22,7 @@ from dynresp.bench.graph_figures import GraphFigures, Value
 from dynresp.bench.graph_parts import Part, measurement, run_part
 from dynresp.bench.machine import describe_machine
 from dynresp.cli.app import app
-from dynresp.errors import MissingMotionDataError, UnknownNameError
+from dynresp.errors import MissingMotionDataError, UnknownNameError, UsageError
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.walk import random_walk
 from dynresp.motion import rotations
@@ -142,6 +142,19 @@ def test_feet_stand_after_fitting(
     assert figures["joint_step_cut_below"] <= figures["joint_step_blended_below"]  # type: ignore[operator]
     assert figures["jumps"] > 0  # type: ignore[operator]
     assert np.isfinite(numbers(figures)).all()
+
+
+def test_feet_of_a_walk_without_jumps(graph: MotionGraph, character: Character) -> None:
+    with pytest.raises(UsageError, match="3 frames hold no stance or no jump; give a larger"):
+        graph_feet.measure(graph, character, 3, 3)
+
+
+def test_feet_of_a_walk_without_stances(
+    graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(graph_feet, "foot_skates", lambda *_: [])
+    with pytest.raises(UsageError, match="100 frames hold no stance or no jump; give a larger"):
+        graph_feet.measure(graph, character, 100, 1)
 
 
 def test_choices_are_counted_and_timed(graph: MotionGraph, character: Character) -> None:

@@ -1,6 +1,7 @@
 """Motion graphs through the command line, on built-in motion."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -167,6 +168,15 @@ class TestWalk:
         wrong = dynresp("graph", "walk", graph, "--out", out, "--balls", "--choices", "1")
         assert wrong.exit_code == 2
 
+    def test_balls_at_another_frame_rate(
+        self, dynresp: Command, graph: Path, tmp_path: Path
+    ) -> None:
+        words = ("--balls", "--fps", 60)
+        result = dynresp("graph", "walk", graph, "--out", tmp_path / "out", *words)
+        assert result.exit_code == 2
+        assert "written at 30 frames a second, not at 60" in " ".join(result.stderr.split())
+        assert not (tmp_path / "out").exists()
+
     def test_a_file_in_the_way(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
         (tmp_path / "out").write_text("mine")
         result = dynresp("graph", "walk", graph, "--out", tmp_path / "out")
@@ -197,7 +207,25 @@ class TestSketch:
             "--out", tmp_path / "out",
         )  # fmt: skip
         assert result.exit_code == 0, result.stderr
-        assert json.loads(result.stdout)["sketch"]["arrived"]
+        content = json.loads(result.stdout)["sketch"]
+        assert content["arrived"]
+        assert content["off_sketch_worst_m"] is None
+
+    def test_a_corner_behind_a_wall(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+        world = tmp_path / "world.toml"
+        world.write_text(
+            "[world]\nbounds = [-5, -5, 5, 5]\n\n[[box]]\ncenter = [1.5, 0]\nsize = [0.2, 10]\n"
+        )
+        words = ("graph", "sketch", graph, "--no-video", "--json", "--out", tmp_path / "out")
+        result = dynresp(*words, "--points", "0,0 3,0 0,0.5", "--world", world)
+        assert result.exit_code == 0, result.stderr
+        content = json.loads(result.stdout)["sketch"]
+        # The wall stands 1.6 m before the corner.
+        assert content["off_sketch_worst_m"] > 1.6 > content["off_path_worst_m"]
+        said = "to a corner of the path sketched it comes no nearer than"
+        assert f"{said} {content['off_sketch_worst_m']:.1f} m; obstacles stand there" in " ".join(
+            result.stderr.split()
+        )
 
     @pytest.mark.parametrize(
         ("words", "said"),
@@ -325,3 +353,20 @@ def test_a_graph_that_cannot_be_written(dynresp: Command, tmp_path: Path, out: s
     assert result.exit_code == 2, result.output
     assert "--out" in result.stderr
     assert "loading" not in result.stderr
+
+
+def test_a_name_that_is_no_text_and_pictures_of_an_earlier_run(
+    dynresp: Command, graph: Path, tmp_path: Path
+) -> None:
+    odd, out = tmp_path / os.fsdecode(b"x\xff.npz"), tmp_path / "out"
+    try:
+        odd.write_bytes(graph.read_bytes())
+    except OSError:
+        pytest.skip("this file system takes names in UTF-8 only")
+    out.mkdir()
+    for name in ("options.png", "watching.png", "mine.png"):
+        (out / name).touch()
+    result = dynresp("graph", "walk", odd, "--seconds", "2", "--no-video", "--out", out, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["title"].endswith("x?.npz")
+    assert {path.name for path in out.iterdir()} == FILES | {"result.json", "mine.png"}

@@ -203,7 +203,7 @@ class TestRefused:
         words = ("graph", "watch", graph, tmp_path / "short.mp4", "--out", tmp_path / "out")
         result = dynresp(*words)
         assert result.exit_code == 2, result.output
-        assert "short.mp4: 1.3 s of video" in result.stderr
+        assert "short.mp4: 1.33 s of video" in result.stderr
         assert "at least 1.5 s" in result.stderr
 
     def test_a_video_of_an_empty_room(

@@ -58,7 +58,8 @@ def test_what_cannot_be_removed_is_told(tmp_path: Path, monkeypatch: pytest.Monk
     fill(tmp_path / "hit_00001")
     monkeypatch.setattr(Path, "unlink", unlink)
     failed = folder.clear_batch(tmp_path, [])
-    assert set(failed) == {*RESPONSE, *(f"hit_00001/{name}" for name in RESPONSE)}
+    there = {*RESPONSE, folder.PLAN, folder.OPTIONS, folder.WATCHING}
+    assert set(failed) == {*there, *(f"hit_00001/{name}" for name in there)}
     assert folder.is_failure(failed["result.json"])
     assert "Permission denied" in failed["result.json"]
 

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,8 +63,20 @@ def test_another_bound_is_another_file(
         ("labels", np.full(180, 7, dtype="<i4"), "do not fit together"),
         ("labels", np.zeros(179, dtype="<i4"), "do not fit together"),
         ("first_weights", np.zeros((3, 128)), "do not fit together"),
-        ("last_biases", np.full(2, np.nan), "do not fit together"),
-        ("variances", np.zeros(2), "do not fit together"),
+        ("means", np.zeros((2, 39)), "do not fit together"),
+        ("last_biases", np.full(2, np.nan), "no sense"),
+        ("last_biases", np.full(2, -np.inf), "no sense"),
+        ("last_biases", np.array([0.0, np.inf]), "no sense"),
+        ("variances", np.zeros(2), "no sense"),
+        ("weights", np.array([1.5, -0.5]), "no sense"),
+        ("spacing", np.array(0), "no sense"),
+        ("curve", np.full((1, 3), np.inf), "no sense"),
+        ("first_biases", np.full(128, np.inf), "no sense"),
+        ("last_weights", np.full((128, 2), -np.inf), "no sense"),
+        ("last_weights", np.full((128, 2), 1e300), "no sense"),
+        ("log_probabilities", np.full((180, 2), np.inf, dtype="<f4"), "no sense"),
+        ("log_probabilities", np.full((180, 2), -np.inf, dtype="<f4"), "no sense"),
+        ("log_probabilities", np.full((180, 2), np.nan, dtype="<f4"), "no sense"),
         ("examples", np.array([20, 999], dtype="<i4"), "not there"),
         ("ages", np.full(7, -1, dtype="<i4"), "not there"),
     ],
@@ -78,4 +91,13 @@ def test_files_that_make_no_sense(
         arrays = {key: archive[key] for key in archive.files if key != "format_version"}
     FORMAT.write(path, {**arrays, name: value})
     with pytest.raises(GraphFileError, match=said):
+        load_actions(path, "mine", graph, sight.table)
+
+
+def test_infinite_weights_make_no_sense(sight: Sight, graph: MotionGraph, tmp_path: Path) -> None:
+    path = tmp_path / "actions.npz"
+    first, last = sight.recogniser.weights
+    wrong = replace(sight.recogniser, weights=(np.full_like(first, np.inf), last))
+    save_actions(path, "mine", sight.forest.clusters, wrong)
+    with pytest.raises(GraphFileError, match="no sense"):
         load_actions(path, "mine", graph, sight.table)

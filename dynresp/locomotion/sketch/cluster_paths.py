@@ -20,7 +20,7 @@ from dynresp.errors import UsageError
 from dynresp.locomotion.clusters.forest import ClusterForest
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.warping import warp_onto_rows
-from dynresp.locomotion.worlds.paths import resampled
+from dynresp.locomotion.worlds.paths import as_path, check_length, resampled
 from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
@@ -93,14 +93,17 @@ class SketchChooser:
         Args:
             frame: The frame the avatar is at.
             place: (4,) where its clip is put.
-            sketch: (k, 2) corners of a path on the ground, from where the avatar is on [m].
+            sketch: (k, 2) corners of a path on the ground, from where the avatar is on, at most
+                1 km long [m].
 
         Raises:
-            UsageError: The frame is not in the graph's component, the sketch is no path, or no
-                action is so short.
+            UsageError: The frame is not in the graph's component, the sketch is no path or too
+                long, or no action is so short.
         """
         forest, graph = self.forest, self.forest.graph
-        points = resampled(sketch, _SPACING)[: round(self.ahead_m / _SPACING) + 1]
+        corners = as_path(sketch, "a sketch")
+        check_length(corners, "the sketch")
+        points = resampled(corners, _SPACING)[: round(self.ahead_m / _SPACING) + 1]
         lead = forest.branch(frame)
         left = forest.depth(self.ahead_s) - (len(lead) - 1)
         if left < 1:

@@ -29,6 +29,9 @@ from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
 
+FARTHEST_AHEAD_M = 100.0
+"""How far ahead on a path the point may be that the avatar should face [m]."""
+
 
 @dataclass(frozen=True)
 class SearchConfig:
@@ -36,7 +39,8 @@ class SearchConfig:
 
     Attributes:
         facing: c of eq. 8, at least 0 and below 1.
-        ahead_m: How far ahead on the path the point is that the avatar should face [m].
+        ahead_m: How far ahead on the path the point is that the avatar should face, at most
+            `FARTHEST_AHEAD_M` [m].
         pace: What a second costs [m]. Well below the speed of walking the search is greedy; at
             that speed and above it looks at all there is.
         stray: At a distance d from the path a second costs 1 + stray d^2 times as much [1/m^2].
@@ -68,6 +72,11 @@ class SearchConfig:
         for name in ("ahead_m", "pace", "stray", "jump", "margin_m"):
             if not getattr(self, name) >= 0:
                 raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
+        if self.ahead_m > FARTHEST_AHEAD_M:
+            raise UsageError(
+                f"ahead_m must be at most {FARTHEST_AHEAD_M:g}, got {self.ahead_m}: nobody faces "
+                "what is farther ahead"
+            )
         if not self.farthest_m > 0:
             raise UsageError(f"farthest_m must be above 0, got {self.farthest_m}")
 

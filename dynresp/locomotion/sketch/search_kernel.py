@@ -83,7 +83,8 @@ def _play(  # type: ignore[no-untyped-def]
         )
         if arrived or frame == stop:
             yaw = state[YAW] + planar[frame, 2]
-            at = min(int(state[PROGRESS] + settings[AHEAD] / settings[SPACING]), last - 1)
+            # The lesser first: what is too large for an integer is none when cut off.
+            at = int(min(state[PROGRESS] + settings[AHEAD] / settings[SPACING], last - 1.0))
             value = eq_8(
                 path, x, y, math.cos(yaw), math.sin(yaw), state[PROGRESS], settings[TARGET], away,
                 settings[AHEAD], facing[at], settings[SPACING],

@@ -24,6 +24,8 @@ from dynresp.progress import Progress
 
 SPACING = 0.1
 """Distance of the points of the path that is walked along [m]."""
+MOST_LOOKED = 10_000_000
+"""The most ways that one search may look at: as many places are remembered, in about 1 GB."""
 # The most states that are looked at in one neighbourhood.
 _CROWDED = 12
 # How many times the budget is spent on coming near to where no way leads.
@@ -59,7 +61,8 @@ class SketchConfig:
         planning: What a good path between obstacles is.
         horizon_m: How far ahead along the path a way is looked for [m].
         commit_s: How much of it is played before the next one is looked for [s].
-        budget: Most ways that are looked at each time.
+        budget: Most ways that are looked at each time, at most `MOST_LOOKED`; where none is found,
+            up to 160 times as many, but no more than that either.
         arrival_m: How near to its end the avatar must come [m]; to that of a path shorter than
             twice this, within half of its length.
         stop: Whether it must stand there; otherwise it may be walking.
@@ -86,6 +89,11 @@ class SketchConfig:
         for name in ("horizon_m", "commit_s", "budget", "arrival_m"):
             if not getattr(self, name) > 0:
                 raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+        if self.budget > MOST_LOOKED:
+            raise UsageError(
+                f"budget must be at most {MOST_LOOKED} ways, got {str(self.budget)[:40]}: room for "
+                "all of them is made before the search begins"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,8 +312,9 @@ class Follower:
         last = target == self.end
         arrival_m = min(self.config.arrival_m, 0.5 * self.end * SPACING)
         found = self.graph.search(
-            at.state, self.path, self.facing, SPACING, at.progress, target, search, budget,
-            crowded, self.grid, arrival_m if last else None, last and self.config.stop,
+            at.state, self.path, self.facing, SPACING, at.progress, target, search,
+            min(budget, MOST_LOOKED), crowded, self.grid, arrival_m if last else None,
+            last and self.config.stop,
         )  # fmt: skip
         self.looked += found.looked
         self.collided += found.collided

@@ -33,6 +33,8 @@ _HANDS = ("left_forearm", "right_forearm")
 _HAND = np.array([0.0, 0.0, -0.3])
 # What a metre of a limb, a metre of height, a metre a second and a radian a second count.
 _LIMB, _HEIGHT, _SPEED, _TURN = 0.5, 3.0, 0.7, 0.2
+OBSERVED = 3 * (len(_PLACES) + len(_HANDS)) + 4
+"""Numbers of an observation: places, height and three speeds."""
 # Speeds are means over so long [s].
 _SPEED_S = 0.4
 
@@ -45,7 +47,7 @@ def sight_observations(database: MotionDatabase, character: Character) -> FloatA
         character: Whose they are.
 
     Returns:
-        (n, 40).
+        (n, `OBSERVED`).
     """
     poses = database.poses.copy()
     facing = database.planar[:, 3]

@@ -36,7 +36,8 @@ class Video:
         """Open a file, or a camera by its number (0 is the first).
 
         Raises:
-            MotionFileError: It cannot be opened, is no video, or its pictures are too large.
+            MotionFileError: It cannot be opened, is no video, its name is not UTF-8, or its
+                pictures are too large.
         """
         import cv2
 
@@ -47,6 +48,12 @@ class Video:
             raise MotionFileError(
                 f"{self.name}: {what}; give a video file, or a camera (such as camera:0)"
             )
+        # OpenCV crashes on a name that Python cannot encode.
+        try:
+            self.name.encode()
+        except UnicodeEncodeError:
+            said = self.name.encode(errors="backslashreplace").decode()
+            raise MotionFileError(f"{said}: the name is not UTF-8; rename the file") from None
         # OpenCV warns on standard error of what it cannot read; the errors below say it.
         level = cv2.utils.logging.getLogLevel()
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)

@@ -29,5 +29,14 @@ def check_numbers(settings: Any) -> None:
         value = getattr(settings, field.name)
         if not expected:
             continue
-        if not isinstance(value, kind) or isinstance(value, bool) or not math.isfinite(value):  # type: ignore[arg-type]
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise UsageError(f"{field.name} must be {expected}, got {str(value)[:40]!r}")
+        try:
+            finite = math.isfinite(value)  # type: ignore[arg-type]
+        except OverflowError:
+            # It has more digits than Python may be willing to write.
+            raise UsageError(
+                f"{field.name} must be {expected}, got one that is larger than any float"
+            ) from None
+        if not finite:
             raise UsageError(f"{field.name} must be {expected}, got {str(value)[:40]!r}")

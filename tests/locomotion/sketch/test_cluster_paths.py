@@ -54,5 +54,7 @@ def test_what_makes_no_sense(character: Character) -> None:
     frame = int(forest.graph.frames[0])
     with pytest.raises(UsageError, match="look farther ahead"):
         SketchChooser(forest, character, 0.01).choose(frame, np.zeros(4), [(0, 0), (1, 0)])
+    with pytest.raises(UsageError, match="the sketch is 1e\\+09 m long; at most 1000 m"):
+        SketchChooser(forest, character).choose(frame, np.zeros(4), [(0, 0), (1e9, 0)])
     with pytest.raises(UsageError, match="component"):
         SketchChooser(forest, character).choose(-1, np.zeros(4), [(0, 0), (1, 0)])

@@ -118,6 +118,21 @@ def test_what_is_found_can_be_walked_and_is_placed_as_it_is_played(character: Ch
     assert found.joints[-1] == len(found.frames) - 1
 
 
+@pytest.mark.parametrize("ahead_m", [1e18, 1e300])
+def test_what_is_faced_may_be_any_way_off(ahead_m: float, character: Character) -> None:
+    """Beyond the end of the path it is the end that is faced; integers do not reach so far."""
+    graph = made_graph(1)
+    tables = SearchGraph(graph, character)
+    start = State.at(graph, int(graph.frames[3]), 0.0, 0.0, 0.3)
+    path = resampled([(0.0, 0.0), (1.0, 0.6)], SPACING)
+    far = SearchConfig(ahead_m=100.0)
+    expected = search(tables, start, path, 8.0, config=far)
+    object.__setattr__(far, "ahead_m", ahead_m)
+    found = search(tables, start, path, 8.0, config=far)
+    assert len(found.frames) > 0
+    assert found.frames.tolist() == expected.frames.tolist()
+
+
 def test_it_goes_on_where_blends_were_left(character: Character) -> None:
     """What is left of blends at a joint is what a playback has there."""
     graph = made_graph(2)

@@ -35,3 +35,14 @@ def test_what_cannot_be_read_is_said(tmp_path) -> None:
         list(video)
     with pytest.raises(MotionFileError, match="camera 99"):
         Video(99)
+
+
+def test_a_name_that_is_not_utf_8(tmp_path) -> None:
+    path = tmp_path / "x\udcff.avi"
+    try:
+        path.write_bytes(b"RIFF")
+    except (OSError, UnicodeEncodeError):
+        pytest.skip("file names are UTF-8 here")
+    with pytest.raises(MotionFileError, match=r"udcff\.avi: the name is not UTF-8; rename") as told:
+        Video(path)
+    str(told.value).encode()

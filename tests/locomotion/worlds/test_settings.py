@@ -1,4 +1,5 @@
 import dataclasses
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,24 @@ def test_what_is_a_number() -> None:
     assert MazeConfig(columns=3, cell_m=2).cell_m == 2
     with pytest.raises(UsageError, match=r"columns must be a whole number, got '2\.5'"):
         MazeConfig(columns=2.5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", ALL)
+@pytest.mark.parametrize("huge", [10**400, -(10**5000), Fraction(10**400)], ids="abc")
+def test_numbers_larger_than_any_float(kind: Any, huge: object) -> None:
+    for field in dataclasses.fields(kind):
+        if field.type in ("float", "int"):
+            with pytest.raises(UsageError, match=f"{field.name} must be"):
+                kind(**{field.name: huge})
+
+
+def test_numbers_that_are_too_large() -> None:
+    assert SearchConfig(ahead_m=100).ahead_m == 100
+    with pytest.raises(UsageError, match=r"ahead_m must be at most 100, got 1e\+18"):
+        SearchConfig(ahead_m=1e18)
+    assert SketchConfig(budget=10_000_000).budget == 10_000_000
+    with pytest.raises(UsageError, match=r"budget must be at most 10000000 ways, got 10{30}:"):
+        SketchConfig(budget=10**30)
 
 
 def test_settings_within_settings() -> None:
