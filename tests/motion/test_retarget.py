@@ -105,10 +105,21 @@ class TestSources:
 
 # Who turns on the spot swings his feet low and slowly, and the reader sets such feet on the floor.
 NOT_PLANNED = [name for name in builtin_names() if builtin_info(name).kind != "locomotion"]
+SET_TOO_SOON = pytest.mark.xfail(
+    reason="whoever rolls over lays a foot down slowly; it is taken for standing while 4 cm above "
+    "the floor and set on it, and the leg that lies below raises the root by 12 mm",
+    strict=True,
+)
 
 
 class TestRoundTrip:
-    @pytest.mark.parametrize("name", NOT_PLANNED)
+    @pytest.mark.parametrize(
+        "name",
+        [
+            pytest.param(name, marks=[SET_TOO_SOON] if name == "get_up_side" else [])
+            for name in NOT_PLANNED
+        ],
+    )
     @pytest.mark.parametrize("foreign", [False, True])
     def test_our_own_export(
         self, character: Character, tmp_path: Path, name: str, foreign: bool
@@ -123,8 +134,7 @@ class TestRoundTrip:
         apart = np.degrees(rotations.angle_between(back.joint_quaternions, made.joint_quaternions))
         assert np.quantile(apart, 0.99) < 3.0
         assert apart.max() < 8.0
-        # Who rolls over drags his feet low and slowly as well; the root then gives way.
-        assert farthest(made, back) < (0.015 if name == "get_up_side" else 0.005)
+        assert farthest(made, back) < 0.005
 
     @pytest.mark.parametrize("name", ["mixamo", "lafan1", "cmu in bvh", "lower case, arms down"])
     def test_what_was_retargeted_once_stays(
