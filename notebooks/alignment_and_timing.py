@@ -28,17 +28,17 @@ import study
 from matplotlib import pyplot as plt
 from study import percent, table, words
 
-from dynresp.bench import align as bench_align
-from dynresp.bench import respond as bench_respond
+from dynresp.bench import alignment_speed as bench_align
+from dynresp.bench import response_speed as bench_respond
 from dynresp.bench.machine import describe_machine, machine_line
-from dynresp.response.alignment import Aligner, AlignmentConfig
-from dynresp.response.classifier_choice import ClassifierChooser
-from dynresp.response.features import extract
-from dynresp.response.oracle import ERROR_FLOOR
-from dynresp.response.oracle_choice import OracleChooser, entry_range, reaction_tracks
-from dynresp.response.respond import Responder
+from dynresp.response.alignment.alignment import Aligner, AlignmentConfig
+from dynresp.response.alignment.error_surface import landscape
+from dynresp.response.prediction.classifier_choice import ClassifierChooser
+from dynresp.response.prediction.hit_features import extract
+from dynresp.response.responder import Responder
 from dynresp.response.response import CARRY_ON
-from dynresp.response.surface import landscape
+from dynresp.response.search.full_search import ERROR_FLOOR
+from dynresp.response.search.full_search_choice import OracleChooser, entry_range, reaction_tracks
 
 study.style()
 data = study.dataset("walk")

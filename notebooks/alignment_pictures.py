@@ -14,8 +14,8 @@ from study import BLUE, GREEN, GREY, INK, ORANGE, RED
 
 from dynresp.bench.measure import BenchResult
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.alignment_result import Alignment
-from dynresp.response.surface import Landscape
+from dynresp.response.alignment.alignment_result import Alignment
+from dynresp.response.alignment.error_surface import Landscape
 
 _STAGE_COLOURS = {
     "physics": GREY,

@@ -29,20 +29,20 @@ import numpy as np
 import study
 from matplotlib import pyplot as plt
 
-from dynresp.graphs.worlds import blocks_of
-from dynresp.locomotion.graph.distance import frame_distances, frame_features
-from dynresp.locomotion.playing.composing import compose
-from dynresp.locomotion.playing.gait import gait_of, ground_speeds
-from dynresp.locomotion.playing.state import State
-from dynresp.locomotion.sketch.following import follow_sketch
-from dynresp.locomotion.sketch.search import SearchGraph
+from dynresp.avatar_runs.world_setup import blocks_of
+from dynresp.locomotion.graph.frame_distance import frame_distances, frame_features
+from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.composition import compose
+from dynresp.locomotion.playing.gait_measures import gait_of, ground_speeds
+from dynresp.locomotion.sketch.path_search import SearchGraph
+from dynresp.locomotion.sketch.sketch_control import follow_sketch
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
 from dynresp.locomotion.worlds.paths import distances_to, resampled
 from dynresp.motion import rotations
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions, load_motion
-from dynresp.motion.sources import find_motion_file, motion_folders
+from dynresp.motion.sources.motion_folders import find_motion_file, motion_folders
 
 study.style()
 character = default_character()

@@ -25,12 +25,12 @@ from matplotlib import pyplot as plt
 from study import BLUE, GREEN, GREY, RED, percent, table, words
 
 from dynresp.learning.baselines import nearest_neighbours
-from dynresp.learning.evaluate import evaluate
-from dynresp.learning.figures import in_use, measure, merge_mirrors
-from dynresp.learning.fitting import Parameters, fit_pipeline
-from dynresp.learning.labelled import groups_of, labelled
-from dynresp.response.features import PAPER_SLICES_S, SLICES_S, vector_columns
-from dynresp.response.prediction import PairwiseQuadratic
+from dynresp.learning.choice_metrics import in_use, measure, merge_mirrors
+from dynresp.learning.evaluation import evaluate
+from dynresp.learning.labelled_samples import groups_of, labelled
+from dynresp.learning.svm_fitting import Parameters, fit_pipeline
+from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
+from dynresp.response.prediction.hit_features import PAPER_SLICES_S, SLICES_S, vector_columns
 
 study.style()
 data = study.dataset("walk")

@@ -26,11 +26,11 @@ import study
 from matplotlib import pyplot as plt
 from study import GREEN, GREY, ORANGE, percent, table
 
-from dynresp.learning.fitting import Parameters, fit_pipeline
-from dynresp.learning.labelled import groups_of, labelled
-from dynresp.response.features import SLICES_S, vector_columns
-from dynresp.response.oracle import ERROR_FLOOR
-from dynresp.response.prediction import PairwiseQuadratic
+from dynresp.learning.labelled_samples import groups_of, labelled
+from dynresp.learning.svm_fitting import Parameters, fit_pipeline
+from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
+from dynresp.response.prediction.hit_features import SLICES_S, vector_columns
+from dynresp.response.search.full_search import ERROR_FLOOR
 
 study.style()
 data = study.dataset("full")

@@ -17,22 +17,23 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse, Polygon
 from matplotlib.typing import ColorType
 
-from dynresp.errors import MissingMotionDataError
-from dynresp.graphs.building import build_graph
-from dynresp.graphs.plan import find_plan, plans_folder, read_plan
+from dynresp.avatar_runs.graph_building import build_graph
+from dynresp.avatar_runs.graph_spec import find_plan, plans_folder, read_plan
 from dynresp.locomotion.choice.actions import choices
-from dynresp.locomotion.clusters.forest import ClusterForest, ClusterTree
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates
-from dynresp.locomotion.graph.database import IntArray
-from dynresp.locomotion.graph.distance import frame_distances, frame_features
+from dynresp.locomotion.graph.frame_database import IntArray
+from dynresp.locomotion.graph.frame_distance import frame_distances, frame_features
+from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.pruning import step_groups
-from dynresp.locomotion.playing.gait import Gait
+from dynresp.locomotion.playing.gait_measures import Gait
 from dynresp.motion.character import default_character
 from dynresp.motion.rotations import FloatArray, from_yaw
-from dynresp.motion.sources import motion_folders
-from dynresp.view import raster, shapes
+from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.support.errors import MissingMotionDataError
+from dynresp.view import body_shapes as shapes
+from dynresp.view import raster
 from dynresp.view.story import Block, MovingCapsule
 
 LEFT, RIGHT = study.BLUE, study.ORANGE

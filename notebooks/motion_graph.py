@@ -30,19 +30,19 @@ import transitions
 from matplotlib import pyplot as plt
 from matplotlib.colors import LogNorm
 
-from dynresp.graphs.asked import Asked
-from dynresp.graphs.outing import Outing
-from dynresp.graphs.sketching import sketch_outing
-from dynresp.graphs.worlds import standing_about
-from dynresp.locomotion.clusters.forest import ClusterForest
-from dynresp.locomotion.clusters.grouping import ClusterConfig, Clusters
-from dynresp.locomotion.clusters.mixture import MixtureConfig
-from dynresp.locomotion.clusters.observations import observations
-from dynresp.locomotion.graph.walk import random_walk
-from dynresp.locomotion.playing.composing import compose
-from dynresp.locomotion.playing.gait import gait_of
+from dynresp.avatar_runs.asked import Asked
+from dynresp.avatar_runs.avatar_run import Outing
+from dynresp.avatar_runs.sketch_run import sketch_outing
+from dynresp.avatar_runs.world_setup import standing_about
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
+from dynresp.locomotion.clusters.cluster_observations import observations
+from dynresp.locomotion.clusters.frame_clusters import ClusterConfig, Clusters
+from dynresp.locomotion.clusters.gaussian_mixture import MixtureConfig
+from dynresp.locomotion.graph.random_walk import random_walk
+from dynresp.locomotion.playing.composition import compose
+from dynresp.locomotion.playing.gait_measures import gait_of
 from dynresp.motion.character import default_character
-from dynresp.motion.skating import foot_skates
+from dynresp.motion.feet.skating import foot_skates
 
 study.style()
 character = default_character()

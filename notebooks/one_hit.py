@@ -26,12 +26,12 @@ from matplotlib import pyplot as plt
 
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import default_character
-from dynresp.motion.library import default_library
+from dynresp.motion.reactions.reaction_library import default_library
 from dynresp.physics.impacts import Ball
-from dynresp.response.quality import measure
-from dynresp.response.respond import Responder
+from dynresp.response.alignment.error_surface import landscape
+from dynresp.response.responder import Responder
 from dynresp.response.response import CARRY_ON
-from dynresp.response.surface import landscape
+from dynresp.response.response_quality import measure
 
 character = default_character()
 library = default_library(character=character)

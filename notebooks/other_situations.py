@@ -23,11 +23,11 @@ import study
 from matplotlib import pyplot as plt
 from study import BLUE, GREEN, GREY, INK, ORANGE, percent, table
 
-from dynresp.learning.figures import in_use, measure
-from dynresp.learning.fitting import Parameters, fit_pipeline
-from dynresp.learning.labelled import Labelled, groups_of, labelled
-from dynresp.response.features import SLICES_S, vector_columns
-from dynresp.response.prediction import PairwiseQuadratic
+from dynresp.learning.choice_metrics import in_use, measure
+from dynresp.learning.labelled_samples import Labelled, groups_of, labelled
+from dynresp.learning.svm_fitting import Parameters, fit_pipeline
+from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
+from dynresp.response.prediction.hit_features import SLICES_S, vector_columns
 
 study.style()
 SITUATIONS = {

@@ -14,7 +14,7 @@ import jupytext
 import nbformat
 from nbconvert.preprocessors import ExecutePreprocessor
 
-from dynresp.files import replacing
+from dynresp.support.files import replacing
 
 FOLDER = Path(__file__).resolve().parent
 MOST_BYTES = 1_500_000

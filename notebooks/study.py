@@ -19,25 +19,25 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from dynresp.datasets.draws import Sample, draw_sample
-from dynresp.datasets.plan import DatasetPlan
-from dynresp.datasets.plan_reading import parse_plan
-from dynresp.datasets.reading import Dataset, load_dataset
-from dynresp.errors import UsageError
-from dynresp.experiments.motions import take_library, take_motion
-from dynresp.experiments.settings import response_config
-from dynresp.learning.split import Split
-from dynresp.learning.train import TrainConfig, train
+from dynresp.datasets.dataset_reader import Dataset, load_dataset
+from dynresp.datasets.dataset_spec import DatasetPlan
+from dynresp.datasets.dataset_spec_reader import parse_plan
+from dynresp.datasets.sample_draws import Sample, draw_sample
+from dynresp.experiments.named_motions import take_library, take_motion
+from dynresp.experiments.response_settings import response_config
+from dynresp.learning.holdout import Split
+from dynresp.learning.training import TrainConfig, train
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
-from dynresp.motion.sources import motion_folders
-from dynresp.paths import examples_folder
-from dynresp.response.classifier import Classifier, TrainedFor
-from dynresp.response.classifier_file import load_classifier, save_classifier
-from dynresp.response.hits import HitStage
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
+from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.response.hit_simulation import HitStage
 from dynresp.response.look_ahead import LookAhead, look_ahead_of
+from dynresp.response.prediction.classifier import Classifier, TrainedFor
+from dynresp.response.prediction.classifier_file import load_classifier, save_classifier
 from dynresp.response.response import ResponseConfig
+from dynresp.support.errors import UsageError
+from dynresp.support.paths import example_specs
 
 FULL = os.environ.get("DYNRESP_STUDY", "small") == "full"
 """Whether this is the full study."""
@@ -116,7 +116,7 @@ def dataset(name: str) -> Dataset:
     where = folder() / name
     if FULL:
         if not where.is_dir():
-            plan = examples_folder() / "plans" / PLANS[name]
+            plan = example_specs("datasets") / PLANS[name]
             count = f" --count {_COUNTS[name]}" if name in _COUNTS else ""
             raise UsageError(
                 f"there is no {where}; make it: dynresp generate {plan} --out {where}{count}"
@@ -210,7 +210,7 @@ def situation(name: str) -> Situation:
     character, config, beside = (
         default_character(),
         response_config(plan.settings),
-        examples_folder(),
+        example_specs("experiments"),
     )
     folders, fps = motion_folders(None), config.physics.fps
     bases = tuple(

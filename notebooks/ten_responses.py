@@ -29,10 +29,10 @@ from IPython import display as shows
 from PIL import Image as Pixels
 from study import percent, table
 
-from dynresp.experiments.report import side_of, spoken
-from dynresp.experiments.showing import show
+from dynresp.experiments.response_files import side_of, spoken
+from dynresp.experiments.response_story import show
 from dynresp.response.budget import chooser_for
-from dynresp.response.respond import Responder
+from dynresp.response.responder import Responder
 from dynresp.view.filmstrip import FilmstripConfig, write_filmstrip
 
 COUNT, SEED = (10 if study.FULL else 1), 2007

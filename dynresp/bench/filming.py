@@ -16,11 +16,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import DynrespError
 from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import DynrespError
 
 Frame = npt.NDArray[np.uint8]
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from dynresp.bench.graph_figures import Measurement, Value
 from dynresp.locomotion.choice.actions import OfferedAction, choices
-from dynresp.locomotion.clusters.forest import ClusterForest
-from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
+from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.motion.character import Character
 
 ENOUGH, WITHIN_MS = 3, 5.0

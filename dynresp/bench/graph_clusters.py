@@ -7,9 +7,9 @@ import time
 import numpy as np
 
 from dynresp.bench.graph_figures import WORLDS, Measurement, Value
-from dynresp.locomotion.clusters.grouping import ClusterConfig, Clusters
-from dynresp.locomotion.clusters.mixture import fit_from_means
-from dynresp.locomotion.clusters.observations import observations
+from dynresp.locomotion.clusters.cluster_observations import observations
+from dynresp.locomotion.clusters.frame_clusters import ClusterConfig, Clusters
+from dynresp.locomotion.clusters.gaussian_mixture import fit_from_means
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
 

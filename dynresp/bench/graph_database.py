@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.errors import MissingMotionDataError
-from dynresp.graphs.building import build_graph
-from dynresp.graphs.plan import find_plan, read_plan
-from dynresp.locomotion.graph.database import Clip, MotionDatabase
+from dynresp.avatar_runs.graph_building import build_graph
+from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.locomotion.graph.frame_database import Clip, MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
-from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.sources import motion_folders
+from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.support.arrays import BoolArray
+from dynresp.support.errors import MissingMotionDataError
 
 PLANS = ("walking", "builtin")
 """Whose motions are taken: of the first plan whose motions are on this machine."""

@@ -8,16 +8,16 @@ import numpy as np
 
 from dynresp.bench.graph_figures import FLAT, Measurement, Value
 from dynresp.bench.graph_steps import COLUMNS, UNITS, at_jumps, source_limits, source_limits_at
-from dynresp.errors import UsageError
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import place_poses
-from dynresp.locomotion.graph.walk import random_walk
-from dynresp.locomotion.playing.composing import compose
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.graph.random_walk import random_walk
+from dynresp.locomotion.playing.composition import compose
 from dynresp.motion.character import Character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.skating import foot_skates
+from dynresp.support.arrays import IntArray
+from dynresp.support.errors import UsageError
 
 SLIDE_M = 0.01
 """A foot that slides less in a stance stands [m]."""

@@ -13,15 +13,15 @@ import numpy as np
 
 from dynresp.bench.graph_figures import FLAT, Measurement, Value
 from dynresp.locomotion.avatar.avatar import Avatar, Doing, Wanderer
-from dynresp.locomotion.avatar.crowd import AvatarCrowd
+from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import IDENTITY
-from dynresp.motion.arrays import BoolArray
 from dynresp.motion.character import ROOT, Character
-from dynresp.motion.library import ReactionLibrary, default_library
+from dynresp.motion.reactions.reaction_library import ReactionLibrary, default_library
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball, Impact, Punch, Push
 from dynresp.response.response import CARRY_ON, ResponseConfig
+from dynresp.support.arrays import BoolArray
 
 # Each avatar is hit about so many times: as many returns of it are remembered, and more.
 _HITS_EACH = 30

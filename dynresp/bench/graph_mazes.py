@@ -12,10 +12,10 @@ import numpy as np
 from dynresp.bench.graph_figures import FLAT, Measurement, Value
 from dynresp.bench.graph_sketch import real_time_ratios, standing_on, warm_up
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.composing import compose
-from dynresp.locomotion.sketch.following import follow_sketch, reach
-from dynresp.locomotion.sketch.search import SearchGraph
-from dynresp.locomotion.sketch.walking import SketchedWalk
+from dynresp.locomotion.playing.composition import compose
+from dynresp.locomotion.sketch.path_search import SearchGraph
+from dynresp.locomotion.sketch.path_walk import SketchedWalk
+from dynresp.locomotion.sketch.sketch_control import follow_sketch, reach
 from dynresp.locomotion.worlds.maze import Maze, random_maze
 from dynresp.locomotion.worlds.obstacles import body_clearances
 from dynresp.locomotion.worlds.paths import resampled

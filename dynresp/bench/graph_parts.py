@@ -86,7 +86,7 @@ def run_part(
     from dynresp.bench.graph_figures import GraphFigures
     from dynresp.bench.machine import describe_machine
     from dynresp.motion.character import default_character
-    from dynresp.motion.sources import motion_folders
+    from dynresp.motion.sources.motion_folders import motion_folders
 
     character, folders = default_character(), motion_folders(motions)
     asked = measurement(part, folders)

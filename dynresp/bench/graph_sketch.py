@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynresp.avatar_runs.sketch_run import standing_at
 from dynresp.bench.graph_figures import FLAT, Measurement, Value
-from dynresp.graphs.sketching import standing_at
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.state import State
-from dynresp.locomotion.sketch.following import follow_sketch
-from dynresp.locomotion.sketch.search import SearchGraph
-from dynresp.locomotion.sketch.walking import SketchConfig, SketchedWalk
+from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.sketch.path_search import SearchGraph
+from dynresp.locomotion.sketch.path_walk import SketchConfig, SketchedWalk
+from dynresp.locomotion.sketch.sketch_control import follow_sketch
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 

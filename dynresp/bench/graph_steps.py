@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.composing import compose
+from dynresp.locomotion.playing.composition import compose
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.quality import joint_speed_steps
+from dynresp.response.response_quality import joint_speed_steps
 
 COLUMNS = ("joint", "root", "turn")
 """What changes its speed: the joint that changes most, the root, and the root's turning."""

@@ -6,15 +6,15 @@ import time
 
 import numpy as np
 
+from dynresp.avatar_runs.world_setup import FLAT
 from dynresp.bench.graph_figures import WORLDS, Measurement, Value
-from dynresp.graphs.worlds import FLAT
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.playing.composing import compose
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.playing.composition import compose
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import IntArray
 
 FITTED = 100_000
 """Most frames whose feet are fitted."""

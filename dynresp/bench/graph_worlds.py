@@ -9,8 +9,8 @@ import numpy as np
 
 from dynresp.bench.graph_figures import Measurement, Value
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.walk import random_walk
-from dynresp.locomotion.playing.composing import compose
+from dynresp.locomotion.graph.random_walk import random_walk
+from dynresp.locomotion.playing.composition import compose
 from dynresp.locomotion.worlds.playground_fitting import (
     Grips,
     compose_on_playground,
@@ -32,8 +32,8 @@ from dynresp.locomotion.worlds.terrain_walk import (
     wander_on_terrain,
 )
 from dynresp.motion.character import Character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import Motion
-from dynresp.motion.skating import foot_skates
 
 TERRAINS = 20
 """How many terrains are crossed, with seeds that follow each other."""

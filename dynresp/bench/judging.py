@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynresp.locomotion.clusters.grouping import Clusters
-from dynresp.locomotion.vision.following import Followed
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.clusters.frame_clusters import Clusters
+from dynresp.locomotion.vision.video_following import Followed
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import IntArray
 
 WITHIN_S = 1.0
 """An answer is right if it was true at some moment of so long up to now [s]."""

@@ -17,15 +17,21 @@ import numpy.typing as npt
 
 from dynresp.bench.filming import Filming, film, write_video
 from dynresp.bench.people import OPTIONS, Person, cut_out, pieces
-from dynresp.locomotion.graph.database import MotionDatabase
-from dynresp.locomotion.vision.features import FeatureConfig
-from dynresp.locomotion.vision.table import ViewTable, joined, sampled, shape_basis, table_identity
-from dynresp.locomotion.vision.video import Video
-from dynresp.locomotion.vision.watching import Sighting, sightings
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.vision.observation import Sighting, sightings
+from dynresp.locomotion.vision.silhouette_features import FeatureConfig
+from dynresp.locomotion.vision.silhouette_table import (
+    ViewTable,
+    joined,
+    sampled,
+    shape_basis,
+    table_identity,
+)
+from dynresp.locomotion.vision.video_reader import Video
 from dynresp.motion.character import Character
 from dynresp.motion.load import load_motion
 from dynresp.motion.motion import Motion
+from dynresp.support.arrays import IntArray
 
 FPS = 30.0
 """Pictures per second of the videos."""

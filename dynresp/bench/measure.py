@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from dynresp.bench.machine import machine_line
-from dynresp.errors import UsageError
+from dynresp.support.errors import UsageError
 
 
 @dataclass(frozen=True)

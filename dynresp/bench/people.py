@@ -13,7 +13,7 @@ import numpy as np
 from dynresp.motion.character import Character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
-from dynresp.paths import models_folder
+from dynresp.support.paths import models_folder
 
 # Videos are cut into pieces of at most so long, and a piece lasts at least so long [s].
 _PIECE_S, _LEAST_S = 20.0, 1.5

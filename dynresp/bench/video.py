@@ -19,18 +19,18 @@ from dynresp.bench.left_out import Gathered, Take, gather, takes_of
 from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult
 from dynresp.bench.people import PEOPLE, Person
-from dynresp.errors import MissingMotionDataError
-from dynresp.locomotion.clusters.forest import ClusterForest
-from dynresp.locomotion.graph.config import GraphConfig
-from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.vision.control import VideoControl
-from dynresp.locomotion.vision.following import CHOICE_S, follow_sightings
-from dynresp.locomotion.vision.recognition import Recogniser
-from dynresp.locomotion.vision.sight import MOST, cluster_by_sight, sight_observations
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.vision.action_recognition import Recogniser
+from dynresp.locomotion.vision.video_control import VideoControl
+from dynresp.locomotion.vision.video_following import CHOICE_S, follow_sightings
+from dynresp.locomotion.vision.visible_clusters import MOST, cluster_by_sight, sight_observations
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.sources import motion_folders
+from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.support.arrays import IntArray
+from dynresp.support.errors import MissingMotionDataError
 
 MOST_S = 60.0
 """How much is filmed of each person [s]."""

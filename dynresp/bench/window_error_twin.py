@@ -14,7 +14,7 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.response.windows import WindowErrorConfig
+from dynresp.response.windows.windows import WindowErrorConfig
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -11,7 +11,7 @@ from typer.core import TyperGroup
 from dynresp import __version__
 from dynresp.cli import bench, demo, evaluate, generate, graph, motions, reactions, run, train
 from dynresp.cli.interruption import INTERRUPTED
-from dynresp.errors import DynrespError
+from dynresp.support.errors import DynrespError
 
 
 class Commands(TyperGroup):

@@ -10,7 +10,7 @@ import typer
 
 from dynresp.bench.graph_parts import Part, run_part
 from dynresp.cli.options import ChosenClassifier, Json, Motions, Seed
-from dynresp.errors import UsageError
+from dynresp.support.errors import UsageError
 
 if TYPE_CHECKING:
     from dynresp.bench.graph_figures import GraphFigures
@@ -27,7 +27,7 @@ app = typer.Typer(
 def physics(seed: Seed = None, as_json: Json = False) -> None:
     """Steps a second of simulated hits, against one thread of mujoco.rollout."""
     typer.echo("stepping for about ten seconds ...", err=True)
-    from dynresp.bench import physics as bench
+    from dynresp.bench import physics_speed as bench
 
     _print(bench.run(seed or 0), as_json)
 
@@ -36,7 +36,7 @@ def physics(seed: Seed = None, as_json: Json = False) -> None:
 def oracle(seed: Seed = None, as_json: Json = False) -> None:
     """Search time a reaction, against vectorised NumPy and a readable twin."""
     typer.echo("searching for about five seconds ...", err=True)
-    from dynresp.bench import oracle as bench
+    from dynresp.bench import full_search_speed as bench
 
     _print(bench.run(seed or 0), as_json)
 
@@ -45,7 +45,7 @@ def oracle(seed: Seed = None, as_json: Json = False) -> None:
 def align(seed: Seed = None, as_json: Json = False) -> None:
     """Time to align one reaction, and its error, against exhaustive alignment."""
     typer.echo("simulating and aligning for about ten seconds ...", err=True)
-    from dynresp.bench import align as bench
+    from dynresp.bench import alignment_speed as bench
 
     _print(bench.run(seed or 0), as_json)
 
@@ -65,7 +65,7 @@ def select(
 ) -> None:
     """Time to predict which reaction fits, against scikit-learn's own predict."""
     typer.echo("training and predicting for about ten seconds ...", err=True)
-    from dynresp.bench import select as bench
+    from dynresp.bench import prediction_speed as bench
 
     _print(bench.run(seed or 0, model=classifier), as_json)
 
@@ -79,7 +79,7 @@ def respond(
 ) -> None:
     """Time from a hit to a finished plan on one core, with every budget."""
     typer.echo("throwing balls for about half a minute ...", err=True)
-    from dynresp.bench import respond as bench
+    from dynresp.bench import response_speed as bench
 
     _print(bench.run(seed or 0, classifier, motions), as_json)
 
@@ -88,7 +88,7 @@ def respond(
 def generate(motions: Motions = None, seed: Seed = None, as_json: Json = False) -> None:
     """Labelled samples a second on one core, against a loop hit by hit."""
     typer.echo("labelling for about ten seconds ...", err=True)
-    from dynresp.bench import generate as bench
+    from dynresp.bench import generation_speed as bench
 
     _print(bench.run(seed or 0, motions), as_json)
 
@@ -139,7 +139,7 @@ def graph(
     for one in parts:
         typer.echo(f"measuring: {one.value} ...", err=True)
         if one is Part.build:
-            from dynresp.bench import graph as bench
+            from dynresp.bench import graph_speed as bench
 
             results[one] = bench.run(seed or 0, motions, sizes=sizes or ())
         else:
@@ -188,7 +188,7 @@ def video(
     """How well an avatar follows strangers in videos, one studio left out at a time."""
     typer.echo("filming and watching people for about twelve minutes ...", err=True)
     from dynresp.bench import video as bench
-    from dynresp.locomotion.vision.sight import MOST
+    from dynresp.locomotion.vision.visible_clusters import MOST
 
     def progress(doing: str) -> None:
         typer.echo(doing, err=True)

@@ -27,6 +27,8 @@ def demo(
 
     Needs no network: without motion capture on this machine it shows the built-in motions.
     """
-    from dynresp.paths import examples_folder
+    from dynresp.support.paths import example_specs
 
-    answer(examples_folder() / EXAMPLE, out, motions, seed, as_json, choice_of(budget, None))
+    answer(
+        example_specs("experiments") / EXAMPLE, out, motions, seed, as_json, choice_of(budget, None)
+    )

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from dynresp.cli.options import Json
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 
 
 def evaluate(
@@ -40,15 +40,15 @@ def evaluate(
     with progress() as told:
         tell = with_elapsed(told)
         tell("reading", 0, 1)
-        from dynresp.datasets.reading import load_dataset
-        from dynresp.experiments.result import to_json
-        from dynresp.learning import evaluate as judging
-        from dynresp.response.classifier_file import load_classifier
+        from dynresp.datasets.dataset_reader import load_dataset
+        from dynresp.learning import evaluation as judging
+        from dynresp.response.prediction.classifier_file import load_classifier
+        from dynresp.results.result_json import to_json
 
         content = judging.evaluate(load_classifier(model), load_dataset(dataset), tell)
         if out is not None:
             tell("writing", 0, 1)
-            from dynresp.learning.report import write_report
+            from dynresp.learning.evaluation_files import write_report
 
             written = write_report(out, content)
     if content["differing_settings"]:

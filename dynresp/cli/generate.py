@@ -13,8 +13,8 @@ from typing import Annotated, Any
 import typer
 
 from dynresp.cli.options import Json, Motions, Seed
-from dynresp.cli.progress import progress
-from dynresp.progress import Progress
+from dynresp.cli.progress_bar import progress
+from dynresp.support.progress import Progress
 
 # Time over which the rate is measured [s]; a bar is refreshed, and lines follow, this often [s].
 _RATE_S = 60.0
@@ -55,8 +55,8 @@ def generate(
     However it was interrupted, the same command goes on where it stopped. A larger --count extends
     the dataset; damaged files are found and made again.
     """
-    from dynresp.datasets.plan_reading import read_plan
-    from dynresp.errors import UsageError
+    from dynresp.datasets.dataset_spec_reader import read_plan
+    from dynresp.support.errors import UsageError
 
     if scheduler is not None and workers is not None:
         raise UsageError(
@@ -66,7 +66,7 @@ def generate(
     file = read_plan(plan).changed(count, seed)
     with progress() as tell:
         tell("reading", 0, 1)
-        from dynresp.datasets import generate as making
+        from dynresp.datasets import generation as making
 
         summary = making.generate(
             file, plan.parent, out, motions, workers, scheduler, shard_size, _paced(tell), _warn
@@ -121,7 +121,7 @@ def _duration(seconds: float) -> str:
 
 def _warn(manifest: Mapping[str, Any]) -> None:
     """Say where built-in motions stand in for motion capture."""
-    from dynresp.cli.telling import tell_substitutes
+    from dynresp.cli.result_text import tell_substitutes
 
     for base in manifest["bases"]:
         said = tell_substitutes({"base": base, "library": manifest["library"]})

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from dynresp.cli.options import Json, Motions
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 
 # The plan that is taken where none is named, and the one for want of its motions.
 _USUAL, _INSTEAD = "walking", "builtin"
@@ -28,14 +28,14 @@ def build(
     as_json: Json = False,
 ) -> None:
     """Build a motion graph, and say how many jumps each pruning rule has left."""
+    from dynresp.avatar_runs.graph_building import build_graph
+    from dynresp.avatar_runs.graph_spec import find_plan, read_plan
     from dynresp.cli.graph_info import tell_graph
     from dynresp.cli.run import check_file
-    from dynresp.errors import MissingMotionDataError
-    from dynresp.graphs.building import build_graph
-    from dynresp.graphs.plan import find_plan, read_plan
-    from dynresp.locomotion.graph.file import save_graph
+    from dynresp.locomotion.graph.graph_file import save_graph
     from dynresp.motion.character import default_character
-    from dynresp.motion.sources import motion_folders
+    from dynresp.motion.sources.motion_folders import motion_folders
+    from dynresp.support.errors import MissingMotionDataError
 
     check_file(out)
     folders = motion_folders(motions)

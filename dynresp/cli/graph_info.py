@@ -20,7 +20,7 @@ Graph = Annotated[
 
 def info(graph: Graph, as_json: Json = False) -> None:
     """Show what a graph is made of, and how many jumps each pruning rule has left."""
-    from dynresp.locomotion.graph.file import load_graph
+    from dynresp.locomotion.graph.graph_file import load_graph
 
     typer.echo(tell_graph(load_graph(graph), graph, as_json))
 
@@ -29,7 +29,7 @@ def graph_facts(graph: MotionGraph) -> dict[str, Any]:
     """Facts about a graph, for `--json`."""
     import dataclasses
 
-    from dynresp.graphs.outing import about_graph
+    from dynresp.avatar_runs.avatar_run import about_graph
 
     config = dataclasses.asdict(graph.config)
     config["coordinates"] = graph.config.coordinates.value

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, finish
 from dynresp.cli.graph_info import Graph
 from dynresp.cli.options import Json, Seed
-from dynresp.cli.outing import USUAL_FPS, Fps, Out, Video, finish
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 from dynresp.cli.run import check_folder
 
 if TYPE_CHECKING:
@@ -59,10 +59,10 @@ def sketch(
     motion.bvh, recording.html, filmstrip.png, plan.png and, where the machine can render,
     video.mp4.
     """
-    from dynresp.graphs.asked import Asked
-    from dynresp.graphs.sketching import sketch_outing
-    from dynresp.graphs.world_file import read_world
-    from dynresp.locomotion.graph.file import load_graph
+    from dynresp.avatar_runs.asked import Asked
+    from dynresp.avatar_runs.sketch_run import sketch_outing
+    from dynresp.avatar_runs.world_spec import read_world
+    from dynresp.locomotion.graph.graph_file import load_graph
     from dynresp.motion.character import default_character
 
     asked = Asked(
@@ -94,7 +94,7 @@ def read_points(text: str | None, file: Path | None) -> FloatArray | None:
     Raises:
         UsageError: Both are given, or one is not what it should be.
     """
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     if text is not None and file is not None:
         raise UsageError("give the path by --points or by --path, not by both")
@@ -117,7 +117,7 @@ _MOST_CORNERS = 10_000
 
 def _lines(file: Path) -> list[str]:
     """The lines of a small file of text."""
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     try:
         with file.open("rb") as stream:
@@ -139,8 +139,8 @@ def _corners(words: list[str], where: str) -> FloatArray:
     """The corners (k, 2) of a path of which each word is one."""
     import numpy as np
 
-    from dynresp.errors import UsageError
     from dynresp.locomotion.worlds.paths import check_length
+    from dynresp.support.errors import UsageError
 
     if len(words) > _MOST_CORNERS:
         raise UsageError(
@@ -158,7 +158,7 @@ def one_point(text: str, where: str) -> tuple[float, float]:
     Raises:
         UsageError: It is none.
     """
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     words = text.split(",")
     try:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, finish
 from dynresp.cli.graph_info import Graph
 from dynresp.cli.options import Json, Motions, Seed
-from dynresp.cli.outing import USUAL_FPS, Fps, Out, Video, finish
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 from dynresp.cli.run import check_folder
 
 if TYPE_CHECKING:
-    from dynresp.graphs.choosing import Pick
+    from dynresp.avatar_runs.choice_run import Pick
 
 
 def walk(
@@ -49,12 +49,12 @@ def walk(
     """
     import numpy as np
 
-    from dynresp.errors import UsageError
-    from dynresp.graphs.outing import Outing
-    from dynresp.graphs.worlds import play_in_world, refuse_blocks
-    from dynresp.locomotion.graph.file import load_graph
-    from dynresp.locomotion.graph.walk import random_walk
+    from dynresp.avatar_runs.avatar_run import Outing
+    from dynresp.avatar_runs.world_setup import play_in_world, refuse_blocks
+    from dynresp.locomotion.graph.graph_file import load_graph
+    from dynresp.locomotion.graph.random_walk import random_walk
     from dynresp.motion.character import default_character
+    from dynresp.support.errors import UsageError
 
     answers = None if choices is None else read_answers(choices)
     if choose and answers is not None:
@@ -71,8 +71,8 @@ def walk(
         refuse_blocks(loaded)
     check_folder(out)
     if balls:
-        from dynresp.graphs.hitting import hit_outing
-        from dynresp.motion.sources import motion_folders
+        from dynresp.avatar_runs.hit_run import hit_outing
+        from dynresp.motion.sources.motion_folders import motion_folders
 
         folders = motion_folders(motions)
         with progress() as tell:
@@ -80,7 +80,7 @@ def walk(
         finish(out, loaded, hit, video, as_json)
         return
     if choose or answers is not None:
-        from dynresp.graphs.choosing import choice_outing
+        from dynresp.avatar_runs.choice_run import choice_outing
 
         typer.echo("looking for clusters ...", err=True)
         chosen = choice_outing(
@@ -89,8 +89,8 @@ def walk(
         finish(out, loaded, chosen, video, as_json)
         return
     if loaded.database.world == "terrain":
-        from dynresp.graphs.asked import Asked
-        from dynresp.graphs.terrain_outing import terrain_outing
+        from dynresp.avatar_runs.asked import Asked
+        from dynresp.avatar_runs.terrain_run import terrain_outing
 
         asked = Asked(seed=seed or 0)
         over = terrain_outing(loaded, default_character(), asked, seconds, fps)
@@ -116,7 +116,7 @@ def read_answers(text: str) -> list[int]:
     Raises:
         UsageError: It is no such list.
     """
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     try:
         answers = [int(word) for word in text.split(",")]
@@ -136,8 +136,8 @@ def picker(answers: list[int] | None) -> Pick:
     Args:
         answers: 0 leaves it to chance; where they end, the walk does.
     """
-    from dynresp.errors import UsageError
-    from dynresp.graphs.choosing import Enough
+    from dynresp.avatar_runs.choice_run import Enough
+    from dynresp.support.errors import UsageError
 
     left = None if answers is None else list(answers)
 

@@ -13,10 +13,10 @@ from typing import Annotated, Any
 
 import typer
 
+from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, finish
 from dynresp.cli.graph_info import Graph
 from dynresp.cli.options import Json, Seed
-from dynresp.cli.outing import USUAL_FPS, Fps, Out, Video, finish
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 from dynresp.cli.run import check_folder
 
 # Time to step out of a camera's picture [s].
@@ -67,10 +67,10 @@ def watch(
     and what the avatar did) and, where the machine can render, video.mp4. What is learnt of a
     graph, a minute the first time, is kept in the cache folder.
     """
-    from dynresp.graphs.sight_file import Sight
-    from dynresp.graphs.video_source import evenly, later, open_source
-    from dynresp.graphs.watching import VideoAsked, check_watchable, watch_outing
-    from dynresp.locomotion.graph.file import load_graph
+    from dynresp.avatar_runs.video_run import VideoAsked, check_watchable, watch_outing
+    from dynresp.avatar_runs.video_source import evenly, later, open_source
+    from dynresp.avatar_runs.visible_cluster_file import Sight
+    from dynresp.locomotion.graph.graph_file import load_graph
     from dynresp.motion.character import default_character
 
     loaded = load_graph(graph)

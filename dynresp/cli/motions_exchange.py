@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from dynresp.cli import told
+from dynresp.cli import motion_options as told
 from dynresp.cli.options import Json, Motions
 
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")]
@@ -92,7 +92,7 @@ def _targets(files: list[Path], out: Path) -> list[Path]:
     Raises:
         UsageError: Two would go to the same place.
     """
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     targets = [out / f"{file.stem}.npz" for file in files]
     twice = [target for target in targets if targets.count(target) > 1]

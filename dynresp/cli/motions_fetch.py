@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dynresp.cli.options import Json
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 
 if TYPE_CHECKING:
-    from dynresp.motion.fetch import FetchPlan
+    from dynresp.motion.sources.fetch import FetchPlan
 
 
 def fetch(
@@ -37,10 +37,10 @@ def fetch(
 
     Shows the licences, checks every file, and takes up an interrupted download where it was left.
     """
-    from dynresp.motion.fetch import FetchProgress, plan_fetch
-    from dynresp.motion.fetch import fetch as fetch_files
-    from dynresp.motion.sources import MOTIONS_VARIABLE
-    from dynresp.paths import expanded
+    from dynresp.motion.sources.fetch import FetchProgress, plan_fetch
+    from dynresp.motion.sources.fetch import fetch as fetch_files
+    from dynresp.motion.sources.motion_folders import MOTIONS_VARIABLE
+    from dynresp.support.paths import expanded
 
     folder = None if motions is None else expanded(motions, "--motions")
     plan = plan_fetch(collection, folder)

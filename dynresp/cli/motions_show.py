@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynresp.cli import told
+from dynresp.cli import motion_options as told
 from dynresp.cli.options import Json, Motions
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def show(
     Frames, length, what was found about the file, way, foot contacts, T-poses, and how well it
     stands on the floor; with --out also a 3D recording and a filmstrip.
     """
-    from dynresp.cli.facts import facts
+    from dynresp.cli.motion_facts import facts
 
     options = told.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
     loaded, file = told.load(motion, motions, options)

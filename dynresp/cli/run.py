@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from dynresp.cli.options import Budget, ChosenBudget, ChosenClassifier, Json, Motions, Seed
-from dynresp.cli.progress import progress
+from dynresp.cli.progress_bar import progress
 
 
 def run(
@@ -61,10 +61,10 @@ def answer(
             a video on a machine that cannot draw is none.
         DynrespError: It could not be done.
     """
-    from dynresp.cli.telling import tell_choosing, tell_result, tell_substitutes, tell_summary
-    from dynresp.experiments.folder import WRITTEN, is_failure
-    from dynresp.experiments.reading import read_experiment
-    from dynresp.experiments.result import to_json
+    from dynresp.cli.result_text import tell_choosing, tell_result, tell_substitutes, tell_summary
+    from dynresp.experiments.experiment_reader import read_experiment
+    from dynresp.results.result_folder import WRITTEN, is_failure
+    from dynresp.results.result_json import to_json
 
     file = read_experiment(experiment)
     check_folder(out)
@@ -95,7 +95,7 @@ def answer(
 
 def check_folder(out: Path) -> None:
     """Refuse, before any work, to write where nothing can be written."""
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out: {str(out)!r} is a file; expected a folder for the results")
@@ -110,7 +110,7 @@ def check_folder(out: Path) -> None:
 
 def check_file(out: Path) -> None:
     """Refuse, before any work, to write a file where none can be written."""
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     if not out.name or out.is_dir():
         raise UsageError(f"--out: expected a file, got {str(out)!r}, which is a folder")

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dynresp.cli.options import Json, Seed
-from dynresp.cli.progress import progress
-from dynresp.progress import Progress
+from dynresp.cli.progress_bar import progress
+from dynresp.support.progress import Progress
 
 if TYPE_CHECKING:
-    from dynresp.response.classifier import Classifier
+    from dynresp.response.prediction.classifier import Classifier
 
 # Where there is no terminal, a line that work goes on follows this often [s].
 _LINE_S = 20.0
@@ -88,7 +88,7 @@ def train(
 ) -> None:
     """Train a classifier to choose as the oracle chose, and judge it by samples held out."""
     from dynresp.cli.run import check_folder
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     if out is not None and (out.suffix != ".skops" or out.is_dir()):
         raise UsageError(f"--out: {str(out)!r}: expected a file whose name ends in .skops")
@@ -97,12 +97,12 @@ def train(
     with progress() as told:
         tell = with_elapsed(told)
         tell("reading", 0, 1)
-        from dynresp.datasets.reading import load_dataset
-        from dynresp.learning import train as learning
-        from dynresp.learning.split import Split
-        from dynresp.paths import classifier_file
-        from dynresp.response.classifier_file import save_classifier
-        from dynresp.response.features import SLICES_S
+        from dynresp.datasets.dataset_reader import load_dataset
+        from dynresp.learning import training as learning
+        from dynresp.learning.holdout import Split
+        from dynresp.response.prediction.classifier_file import save_classifier
+        from dynresp.response.prediction.hit_features import SLICES_S
+        from dynresp.support.paths import classifier_file
 
         config = learning.TrainConfig(
             vector=vector.value,
@@ -151,7 +151,7 @@ def with_elapsed(tell: Progress, clock: Callable[[], float] = time.monotonic) ->
 
 
 def _slices(given: str) -> tuple[float, ...]:
-    from dynresp.errors import UsageError
+    from dynresp.support.errors import UsageError
 
     try:
         return tuple(float(part) for part in given.split(","))

@@ -9,15 +9,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dynresp.datasets.plan import KINDS, DatasetPlan, plain
-from dynresp.datasets.schema import PARAMETERS, SCHEMA_VERSION
-from dynresp.experiments.motions import Taken, about_library
-from dynresp.experiments.result import versions
-from dynresp.experiments.settings import in_force
-from dynresp.files import replacing
+from dynresp.datasets.dataset_spec import KINDS, DatasetPlan, plain
+from dynresp.datasets.shard_schema import PARAMETERS, SCHEMA_VERSION
+from dynresp.experiments.named_motions import Taken, about_library
+from dynresp.experiments.response_settings import in_force
 from dynresp.motion.character import Character
-from dynresp.motion.library import MIRRORED, ReactionLibrary
+from dynresp.motion.reactions.reaction_library import MIRRORED, ReactionLibrary
 from dynresp.response.response import CARRY_ON, ResponseConfig
+from dynresp.results.result_json import versions
+from dynresp.support.files import replacing
 
 MANIFEST = "manifest.json"
 FORMAT = "dynresp dataset"

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.datasets.schema import Column, Columns, arrow_schema
-from dynresp.errors import DynrespError
+from dynresp.datasets.shard_schema import Column, Columns, arrow_schema
+from dynresp.support.errors import DynrespError
 
 _KEY = b"dynresp"
 _NAME = re.compile(r"shard-(\d{5,})\.parquet")

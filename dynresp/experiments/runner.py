@@ -9,10 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.errors import MotionError, SpecError
-from dynresp.experiments import batch
-from dynresp.experiments.choosing import Choosing, take_chooser
-from dynresp.experiments.folder import (
+from dynresp.experiments import batch_summary as batch
+from dynresp.experiments.chooser import Choosing, take_chooser
+from dynresp.experiments.drawn_hits import Hit, draw_hits
+from dynresp.experiments.experiment_spec import Experiment, StrikerCut, StrikeTable
+from dynresp.experiments.named_motions import Taken, about_library, take_library, take_motion
+from dynresp.experiments.response_files import write_response
+from dynresp.experiments.response_settings import in_force, response_config
+from dynresp.motion.character import Character, default_character
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
+from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.physics.impacts import Ball, prepare
+from dynresp.response.responder import Responder
+from dynresp.response.response import Response, ResponseConfig
+from dynresp.response.response_quality import Quality, measure
+from dynresp.results.result_folder import (
     RESULT,
     SUMMARY,
     TABLE,
@@ -20,20 +31,9 @@ from dynresp.experiments.folder import (
     clear_batch,
     hit_folder,
 )
-from dynresp.experiments.hits import Hit, draw_hits
-from dynresp.experiments.motions import Taken, about_library, take_library, take_motion
-from dynresp.experiments.report import write_response
-from dynresp.experiments.result import versions, write_json
-from dynresp.experiments.settings import in_force, response_config
-from dynresp.experiments.spec import Experiment, StrikerCut, StrikeTable
-from dynresp.motion.character import Character, default_character
-from dynresp.motion.library import ReactionLibrary
-from dynresp.motion.sources import motion_folders
-from dynresp.physics.impacts import Ball, prepare
-from dynresp.progress import Progress
-from dynresp.response.quality import Quality, measure
-from dynresp.response.respond import Responder
-from dynresp.response.response import Response, ResponseConfig
+from dynresp.results.result_json import versions, write_json
+from dynresp.support.errors import MotionError, SpecError
+from dynresp.support.progress import Progress
 
 # Hits are answered in bundles of this size, so that memory does not grow with their number.
 _BUNDLE = 100

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.learning.figures import Choices
-from dynresp.learning.labelled import Labelled
+from dynresp.learning.choice_metrics import Choices
+from dynresp.learning.labelled_samples import Labelled
 
 NEIGHBOURS = 7
 """How many vote."""

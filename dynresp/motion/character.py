@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from dynresp import paths
-from dynresp.errors import MotionError, UnknownNameError
 from dynresp.motion import rotations
-from dynresp.motion.arrays import frozen
 from dynresp.motion.rotations import FloatArray
+from dynresp.support import paths
+from dynresp.support.arrays import frozen
+from dynresp.support.errors import MotionError, UnknownNameError
 
 POSE_SIZE = 59
 VELOCITY_SIZE = 45

@@ -20,14 +20,14 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.archive import text_array
-from dynresp.errors import MotionError
-from dynresp.files import replacing
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers import npz
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.archive import text_array
+from dynresp.support.errors import MotionError
+from dynresp.support.files import replacing
 
 # World axes in the order in which they become BVH's x, y, z: left, up, forward.
 _LEFT_UP_FORWARD = [1, 2, 0]

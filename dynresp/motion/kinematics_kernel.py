@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numba import njit, types
 
-from dynresp.compiling import compiled
+from dynresp.support.compiling import compiled
 
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
 _INTS = types.Array(types.int64, 1, "C", readonly=True)

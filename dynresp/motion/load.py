@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
-from dynresp.errors import MotionError, MotionFileError
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers import read_motion_file
 from dynresp.motion.readers.npz import read_npz
-from dynresp.motion.retarget import RetargetConfig, retarget, trim_t_poses
+from dynresp.motion.retargeting.retarget import RetargetConfig, retarget, trim_t_poses
+from dynresp.support.errors import MotionError, MotionFileError
 
 # Motions kept in memory; the whole development collection is about 150 MB.
 _KEPT = 64

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError
 from dynresp.motion import rotations
 from dynresp.motion.character import JOINTS, POSE_SIZE, ROOT, ROOT_QUAT, Character, as_poses
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import MotionError
 
 # Foot order everywhere: left, right.
 FEET = ("left", "right")

@@ -14,12 +14,12 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import SpecError
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig
+from dynresp.support.errors import SpecError
 
 GRAVITY = 9.81
 # A ball or a fist is let go this long before it is due [s] or with its surface this far away [m],

@@ -13,10 +13,10 @@ from enum import Enum
 import mujoco
 import numpy as np
 
-from dynresp import paths
-from dynresp.errors import UsageError
 from dynresp.motion.character import Character
 from dynresp.physics.servo import ServoConfig, add_servos
+from dynresp.support import paths
+from dynresp.support.errors import UsageError
 
 PREFIX = "character/"
 IMPACTOR_PREFIX = "impactor/"

@@ -13,9 +13,9 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
-from dynresp.errors import UsageError
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 
 def _torque_limits() -> Mapping[str, float]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias, get_args
 
-from dynresp.errors import UsageError
 from dynresp.motion.character import Character
-from dynresp.motion.library import ReactionLibrary
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.response.choice import Chooser
-from dynresp.response.classifier import Classifier
-from dynresp.response.classifier_choice import ClassifierChooser
-from dynresp.response.oracle_choice import OracleChooser
+from dynresp.response.prediction.classifier import Classifier
+from dynresp.response.prediction.classifier_choice import ClassifierChooser
 from dynresp.response.response import ResponseConfig
+from dynresp.response.search.full_search_choice import OracleChooser
+from dynresp.support.errors import UsageError
 
 Budget: TypeAlias = Literal["fast", "better", "best"]
 BUDGETS: tuple[str, ...] = get_args(Budget)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from dynresp.motion.character import Character
-from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.response.look_ahead import LookAhead
 from dynresp.response.response import ResponseConfig
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
-from dynresp.errors import UsageError
 from dynresp.motion.character import BodyStates
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import PreparedImpact
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Contact, Divergence
-from dynresp.response.features import SLICES_S
-from dynresp.response.transition import TransitionConfig
-from dynresp.response.windows import WindowErrorConfig
+from dynresp.response.prediction.hit_features import SLICES_S
+from dynresp.response.transition.transition import TransitionConfig
+from dynresp.response.windows.windows import WindowErrorConfig
+from dynresp.support.errors import UsageError
 
 CARRY_ON = "carry_on"
 """Name of the choice to go on with the base motion."""

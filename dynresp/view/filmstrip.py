@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynresp.files import replacing
 from dynresp.motion.rotations import FloatArray
-from dynresp.view import raster, shapes
-from dynresp.view.apart import settle, spread
-from dynresp.view.cast import Cast
-from dynresp.view.moments import Moment, camera_yaw, choose_moments, main_direction
-from dynresp.view.shapes import PHASE_COLORS
+from dynresp.support.files import replacing
+from dynresp.view import body_shapes as shapes
+from dynresp.view import raster
+from dynresp.view.body_shapes import PHASE_COLORS
+from dynresp.view.label_layout import settle, spread
+from dynresp.view.scene_solids import Cast
 from dynresp.view.story import PHASE_NAMES, Story
+from dynresp.view.story_moments import Moment, camera_yaw, choose_moments, main_direction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

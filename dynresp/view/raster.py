@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.rotations import FloatArray
-from dynresp.view.shapes import Mesh
+from dynresp.view.body_shapes import Mesh
 
 # Where the light comes from, as seen by the camera: right, up, towards the camera.
 _LIGHT = np.array([-0.48, 0.66, 0.58])

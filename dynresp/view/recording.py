@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynresp.errors import DynrespError
-from dynresp.files import replacing
-from dynresp.view import shapes
-from dynresp.view.cast import Cast
-from dynresp.view.moments import camera_yaw
-from dynresp.view.shapes import PHASE_COLORS, Color, Mesh
+from dynresp.support.errors import DynrespError
+from dynresp.support.files import replacing
+from dynresp.view import body_shapes as shapes
+from dynresp.view.body_shapes import PHASE_COLORS, Color, Mesh
+from dynresp.view.scene_solids import Cast
 from dynresp.view.story import PHASE_NAMES, MovingCapsule, MovingSphere, PhaseName, Story, row_at
+from dynresp.view.story_moments import camera_yaw
 
 if TYPE_CHECKING:
     from viser import ViserServer

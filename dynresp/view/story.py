@@ -14,10 +14,10 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError, UnknownNameError
 from dynresp.motion import rotations
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import MotionError, UnknownNameError
 
 PhaseName = Literal["base motion", "physics", "blend", "reaction"]
 PHASE_NAMES: tuple[PhaseName, ...] = get_args(PhaseName)

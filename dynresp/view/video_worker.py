@@ -1,8 +1,8 @@
 """Draws a video in a process of its own: `python -m dynresp.view.video_worker SCRIPT.npz OUT.mp4`.
 
-`dynresp.view.video` starts it with `MUJOCO_GL` set, since MuJoCo reads that once, on import. A line
-on standard output that begins with `PROGRESS` is frames done and frames in all, others are of
-drivers and mean nothing; why it failed is the last line on standard error.
+`dynresp.view.video_writer` starts it with `MUJOCO_GL` set, since MuJoCo reads that once, on import.
+A line on standard output that begins with `PROGRESS` is frames done and frames in all, others are
+of drivers and mean nothing; why it failed is the last line on standard error.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynresp import paths
+from dynresp.support import paths
 
 PROGRESS = "dynresp-video"
 """First word of a line that tells progress."""
@@ -36,7 +36,7 @@ def main(script_file: str, video_file: str) -> None:
     """Draw what a script says.
 
     Args:
-        script_file: An .npz file as `dynresp.view.video` makes it.
+        script_file: An .npz file as `dynresp.view.video_writer` makes it.
         video_file: The MP4 to write.
     """
     import imageio_ffmpeg

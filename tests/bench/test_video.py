@@ -10,16 +10,16 @@ from dynresp.bench import video as bench
 from dynresp.bench.judging import Judged
 from dynresp.bench.left_out import part_of, part_of_table
 from dynresp.bench.people import PEOPLE, Body, Person
-from dynresp.errors import MissingMotionDataError
-from dynresp.locomotion.clusters.grouping import Clusters
-from dynresp.locomotion.clusters.mixture import Mixture
-from dynresp.locomotion.vision.features import FeatureConfig
-from dynresp.locomotion.vision.following import Followed
+from dynresp.locomotion.clusters.frame_clusters import Clusters
+from dynresp.locomotion.clusters.gaussian_mixture import Mixture
+from dynresp.locomotion.vision.silhouette_features import FeatureConfig
+from dynresp.locomotion.vision.silhouette_table import ViewTable
 from dynresp.locomotion.vision.silhouettes import Viewpoints
-from dynresp.locomotion.vision.table import ViewTable
+from dynresp.locomotion.vision.video_following import Followed
 from dynresp.motion.character import default_character
 from dynresp.motion.export import write_bvh
 from dynresp.motion.motion import Motion
+from dynresp.support.errors import MissingMotionDataError
 from tests.locomotion.graph.graph_samples import made_database
 from tests.locomotion.vision.samples import stepping, waving
 

@@ -56,8 +56,8 @@ def test_a_dataset_from_a_plan(plan: Path, tmp_path: Path, dynresp: Command) -> 
 def test_built_in_motions_that_stand_in_are_told(
     tmp_path: Path, dynresp: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dynresp.datasets import generate as making
-    from dynresp.errors import DynrespError
+    from dynresp.datasets import generation as making
+    from dynresp.support.errors import DynrespError
 
     def stopped(*given: object) -> None:
         raise DynrespError("stopped")

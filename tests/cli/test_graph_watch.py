@@ -17,8 +17,8 @@ from dynresp.bench.filming import SIZE, Filming, film, write_video
 from dynresp.bench.people import Body
 from dynresp.cli import graph_watch
 from dynresp.cli.app import app
-from dynresp.locomotion.graph.file import load_graph, save_graph
-from dynresp.motion.builtin.motions import load_builtin
+from dynresp.locomotion.graph.graph_file import load_graph, save_graph
+from dynresp.motion.builtin.builtin_motions import load_builtin
 from dynresp.motion.load import load_motion
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers.npz import read_npz

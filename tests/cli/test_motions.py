@@ -130,7 +130,7 @@ def test_fetch_shows_licences_and_fetches_from_a_server(
 ) -> None:
     # No server listens there: what can be shown beforehand is, and the failure is one line.
     monkeypatch.setenv("DYNRESP_FETCH_URL", "http://127.0.0.1:9")
-    from dynresp.motion import download
+    from dynresp.motion.sources import download
 
     monkeypatch.setattr(download.time, "sleep", lambda seconds: None)
     result = dynresp("motions", "fetch", "core", "--motions", tmp_path / "motions")

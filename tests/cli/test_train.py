@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from dynresp.cli.train import with_elapsed
-from dynresp.response.classifier_file import load_classifier
+from dynresp.response.prediction.classifier_file import load_classifier
 
 from ..learning.samples import CHOICES, dataset, write_dataset
 from .conftest import Command

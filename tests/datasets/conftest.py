@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from dynresp.datasets import generate as making
+from dynresp.datasets import generation as making
+from dynresp.datasets.sample_worker import Job, Workshop
 from dynresp.datasets.shards import Place
-from dynresp.datasets.work import Job, Workshop
 
 from .samples import plan
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.plan import DatasetPlan
-from dynresp.datasets.plan_reading import parse_plan
-from dynresp.datasets.schema import Column, Columns, columns
+from dynresp.datasets.dataset_spec import DatasetPlan
+from dynresp.datasets.dataset_spec_reader import parse_plan
+from dynresp.datasets.shard_schema import Column, Columns, columns
 
 PLAN = """\
 [plan]

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.datasets.generate import Summary
-from dynresp.datasets.plan import KINDS, DatasetPlan
-from dynresp.datasets.plan_reading import parse_plan
-from dynresp.datasets.schema import columns
-from dynresp.paths import examples_folder
+from dynresp.datasets.dataset_spec import KINDS, DatasetPlan
+from dynresp.datasets.dataset_spec_reader import parse_plan
+from dynresp.datasets.generation import Summary
+from dynresp.datasets.shard_schema import columns
+from dynresp.support.paths import example_specs
 
 TEXT = (Path(__file__).parents[2] / "docs/datasets.md").read_text(encoding="utf-8")
 
@@ -42,7 +42,7 @@ def test_all_that_is_told_at_the_end_is_explained() -> None:
 
 
 def test_all_example_plans_are_named() -> None:
-    for file in (examples_folder() / "plans").glob("*.toml"):
+    for file in (example_specs("datasets")).glob("*.toml"):
         assert f"`{file.stem}`" in TEXT, file
     for kind in KINDS:
         assert f'`"{kind}"`' in TEXT

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.datasets.facts import parse_facts
-from dynresp.datasets.plan_reading import read_plan
+from dynresp.datasets.dataset_spec_reader import read_plan
+from dynresp.datasets.manifest_reader import parse_facts
+from dynresp.datasets.sample_worker import Workshop
 from dynresp.datasets.shards import decode, places
-from dynresp.datasets.work import Workshop
-from dynresp.paths import examples_folder
+from dynresp.support.paths import example_specs
 
-PLANS = examples_folder() / "plans"
+PLANS = example_specs("datasets")
 CORE = sorted(file.stem for file in PLANS.glob("*.toml") if not file.stem.startswith("full"))
 
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynresp.datasets.facts import ManifestError, parse_facts, read_manifest
 from dynresp.datasets.manifest import MANIFEST, differences, identity_of, write_manifest
-from dynresp.datasets.work import Workshop
-from dynresp.errors import UsageError
-from dynresp.response.labelling import OUTCOMES
+from dynresp.datasets.manifest_reader import ManifestError, parse_facts, read_manifest
+from dynresp.datasets.sample_worker import Workshop
+from dynresp.response.search.hit_labels import OUTCOMES
+from dynresp.support.errors import UsageError
 
 from .samples import plan
 

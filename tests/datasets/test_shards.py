@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynresp.datasets.schema import columns
+from dynresp.datasets.shard_schema import columns
 from dynresp.datasets.shards import (
     ForeignShardError,
     Place,

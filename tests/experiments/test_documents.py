@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.experiments.reading import parse_experiment
+from dynresp.experiments.experiment_reader import parse_experiment
 from dynresp.experiments.runner import prepare_run, run_experiment
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ def test_an_example_runs(document: str, text: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("key", ["settings", "output", "experiment", "library"])
 def test_all_keys_are_explained(key: str) -> None:
-    from dynresp.experiments.spec import Experiment
+    from dynresp.experiments.experiment_spec import Experiment
 
     text = (ROOT / "docs/experiments.md").read_text(encoding="utf-8")
     (section,) = re.findall(rf"^## `\[{key}\]`.*?(?=^##? )", text, re.M | re.S)

@@ -5,18 +5,18 @@ from typing import Any
 
 import pytest
 
-from dynresp.experiments.reading import read_experiment
+from dynresp.experiments.experiment_reader import read_experiment
+from dynresp.experiments.experiment_spec import Experiment
 from dynresp.experiments.runner import prepare_run, run_experiment
-from dynresp.experiments.spec import Experiment
-from dynresp.motion.collection import collection_files, files_named_in
-from dynresp.paths import examples_folder
+from dynresp.motion.sources.collection import collection_files, files_named_in
+from dynresp.support.paths import example_specs
 
 SINGLE = ("walk_ball", "push", "punch", "strike")
 
 
 def example(name: str, **table: int) -> Experiment:
     """An example that writes little, its `[experiment]` changed."""
-    experiment = read_experiment(examples_folder() / f"{name}.toml")
+    experiment = read_experiment(example_specs("experiments") / f"{name}.toml")
     return experiment.model_copy(
         update={
             "experiment": experiment.experiment.model_copy(update=table),
@@ -26,12 +26,12 @@ def example(name: str, **table: int) -> Experiment:
 
 
 def run(experiment: Experiment, out: Path, motions: Path) -> dict[str, Any]:
-    return run_experiment(prepare_run(experiment, examples_folder(), motions), out)
+    return run_experiment(prepare_run(experiment, example_specs("experiments"), motions), out)
 
 
 def test_what_they_need_can_be_fetched() -> None:
     core = {source.file for source in collection_files("core")}
-    for file in examples_folder().glob("*.toml"):
+    for file in example_specs("experiments").glob("*.toml"):
         assert files_named_in(file) <= core, file
 
 

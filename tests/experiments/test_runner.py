@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynresp.errors import DynrespError, MissingMotionDataError, SpecError, UnknownNameError
-from dynresp.experiments.reading import read_experiment
-from dynresp.experiments.result import to_json
+from dynresp.experiments.experiment_reader import read_experiment
+from dynresp.experiments.experiment_spec import SettingsTable
+from dynresp.experiments.response_settings import in_force, response_config
 from dynresp.experiments.runner import chosen_hits, prepare_run, run_experiment
-from dynresp.experiments.settings import in_force, response_config
-from dynresp.experiments.spec import SettingsTable
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers.npz import read_npz
+from dynresp.results.result_json import to_json
+from dynresp.support.errors import DynrespError, MissingMotionDataError, SpecError, UnknownNameError
 
 from .samples import write_world
 
@@ -125,7 +125,7 @@ def test_a_divergence_is_reported_and_takes_no_other_down(
 ) -> None:
     from dynresp.experiments import runner
     from dynresp.physics.trace import Divergence
-    from dynresp.response.respond import Responder
+    from dynresp.response.responder import Responder
     from dynresp.response.response import Response
 
     def respond(self: Responder, hits: list[tuple[Motion, Any]], tell: Any) -> list[Response]:

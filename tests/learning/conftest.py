@@ -2,8 +2,8 @@
 
 import pytest
 
-from dynresp.datasets.reading import Dataset
-from dynresp.learning.train import TrainConfig, Trained, train
+from dynresp.datasets.dataset_reader import Dataset
+from dynresp.learning.training import TrainConfig, Trained, train
 
 from .samples import dataset, quiet
 

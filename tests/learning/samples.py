@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.facts import Facts
+from dynresp.datasets.dataset_reader import Dataset
 from dynresp.datasets.manifest import FORMAT, identity_of, write_manifest
-from dynresp.datasets.reading import Dataset
-from dynresp.datasets.schema import PARAMETERS
+from dynresp.datasets.manifest_reader import Facts
+from dynresp.datasets.shard_schema import PARAMETERS
 from dynresp.datasets.shards import encode, places
-from dynresp.response.features import FEATURE_NAMES
+from dynresp.response.prediction.hit_features import FEATURE_NAMES
 from dynresp.response.response import CARRY_ON
 
 CHOICES = ("left", "left_mirrored", "ahead", "ahead_mirrored", "roll", "roll_mirrored", CARRY_ON)

@@ -6,7 +6,7 @@ from dynresp.learning.baselines import (
     most_frequent,
     nearest_neighbours,
 )
-from dynresp.learning.labelled import Labelled
+from dynresp.learning.labelled_samples import Labelled
 
 from ..oracles import learning as slow
 

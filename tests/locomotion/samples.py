@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.graphs.building import build_graph
-from dynresp.graphs.plan import find_plan, read_plan
-from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.avatar_runs.graph_building import build_graph
+from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character

@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynresp.motion import legs, rotations
+from dynresp.motion import rotations
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
-from dynresp.motion.foot_fitting import Composed
+from dynresp.motion.feet import legs
+from dynresp.motion.feet.foot_fitting import Composed
+from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET, Motion, move_poses
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.skating import foot_slides
 from tests.physics.samples import standing
 
 FPS = 30.0

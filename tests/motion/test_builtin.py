@@ -5,8 +5,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynresp.errors import SpecError, UnknownNameError
-from dynresp.motion import ground, legs, rotations
+from dynresp.motion import ground, rotations
 from dynresp.motion.builtin import (
     PREFIX,
     builtin_folder,
@@ -19,8 +18,10 @@ from dynresp.motion.builtin import (
 from dynresp.motion.builtin.footing import Sole
 from dynresp.motion.builtin.keypose_spec import BuiltinSpec, read_spec
 from dynresp.motion.character import Character
+from dynresp.motion.feet import legs
 from dynresp.motion.motion import FEET
-from dynresp.motion.strategies import STRATEGIES
+from dynresp.motion.reactions.strategies import STRATEGIES
+from dynresp.support.errors import SpecError, UnknownNameError
 
 NAMES = builtin_names()
 GRAVITY = 9.81

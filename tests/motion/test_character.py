@@ -5,11 +5,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from dynresp import paths
-from dynresp.errors import MotionError, UnknownNameError
 from dynresp.motion import rotations
 from dynresp.motion.character import Character, as_poses
 from dynresp.motion.ground import clearances
+from dynresp.support import paths
+from dynresp.support.errors import MotionError, UnknownNameError
 from tests.motion.samples import random_poses
 from tests.oracles import kinematics as slow
 from tests.oracles.quaternions import matrix

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import SpecError
 from dynresp.motion import ground, rotations
 from dynresp.motion.builtin import builtin_info, builtin_names, load_builtin, make_motion
 from dynresp.motion.builtin.course import balance, center_of_mass
 from dynresp.motion.builtin.keypose_spec import read_spec
 from dynresp.motion.character import Character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import FEET, Motion
-from dynresp.motion.skating import foot_skates
+from dynresp.support.errors import SpecError
 
 NAMES = [name for name in builtin_names() if builtin_info(name).kind == "locomotion"]
 GRAVITY = 9.81

@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from dynresp.errors import DynrespError, MotionError
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.export import write_bvh, write_npz, zxy_angles
 from dynresp.motion.motion import Label, Motion
 from dynresp.motion.readers.bvh import read_bvh
+from dynresp.support.errors import DynrespError, MotionError
 from tests.motion.samples import random_poses, smooth_motion
 
 X, Y, Z = np.eye(3)

@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import SpecError
-from dynresp.locomotion.avatar.reentry import ReentryPlanner
-from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.avatar.graph_entry import ReentryPlanner
+from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import ground, rotations
 from dynresp.motion.builtin import FLAT, builtin_folder, builtin_info, load_builtin
 from dynresp.motion.builtin.hands import hand_tip, hand_tracks
 from dynresp.motion.builtin.keypose_spec import read_spec
 from dynresp.motion.character import Character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import FEET, Motion
-from dynresp.motion.skating import foot_skates
+from dynresp.support.errors import SpecError
 
 NAMES = ("get_up_prone", "get_up_side")
 

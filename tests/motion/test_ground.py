@@ -2,10 +2,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from dynresp import paths
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, Character
 from dynresp.motion.ground import ContactConfig, clearances, foot_contacts, sole_points
+from dynresp.support import paths
 from tests.motion.samples import random_poses
 from tests.oracles import kinematics as slow
 

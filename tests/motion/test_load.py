@@ -4,11 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.character import Character
 from dynresp.motion.export import write_bvh, write_npz
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
+from dynresp.support.errors import MotionFileError
 
 
 def _standing(character: Character, frames: int = 30, height: float = 0.0) -> Motion:

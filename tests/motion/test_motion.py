@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynresp.errors import MotionError
 from dynresp.motion import rotations
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
@@ -17,6 +16,7 @@ from dynresp.motion.motion import (
     move_poses,
     pose_velocities,
 )
+from dynresp.support.errors import MotionError
 from tests.motion.samples import random_poses, smooth_motion
 from tests.oracles import kinematics as slow
 from tests.oracles.quaternions import matrix

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.character import Character
 from dynresp.motion.export import write_npz
 from dynresp.motion.motion import Label, Motion
 from dynresp.motion.readers.npz import FORMAT_VERSION, MAX_FRAMES, MEMBERS, read_npz
+from dynresp.support.errors import MotionFileError
 from tests.motion.samples import random_poses
 
 

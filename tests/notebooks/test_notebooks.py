@@ -11,7 +11,7 @@ from types import ModuleType
 import matplotlib as mpl
 import pytest
 
-from dynresp.errors import UsageError
+from dynresp.support.errors import UsageError
 
 FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = [

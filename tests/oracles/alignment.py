@@ -1,4 +1,4 @@
-"""Time alignment, slow and readable: what `dynresp.response.alignment` must equal."""
+"""Time alignment, slow and readable: what `dynresp.response.alignment.alignment` must equal."""
 
 import math
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from dynresp.bench.window_error_twin import cut_window, window_error
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.alignment import AlignmentConfig
-from dynresp.response.windows import ReactionTrack, WindowErrorConfig
+from dynresp.response.alignment.alignment import AlignmentConfig
+from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
 
 Track = tuple[FloatArray, FloatArray]
 

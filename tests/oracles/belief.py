@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.vision.belief import BeliefConfig
-from dynresp.locomotion.vision.table import ViewTable
+from dynresp.locomotion.vision.silhouette_table import ViewTable
 
 FloatArray = npt.NDArray[np.float64]
 

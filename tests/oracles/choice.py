@@ -8,8 +8,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.choice.window import ChoiceWindow
-from dynresp.locomotion.clusters.forest import ClusterForest, ClusterTree
+from dynresp.locomotion.choice.action_window import ChoiceWindow
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
 from dynresp.motion.rotations import FloatArray
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 
 ALIKE = 3

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.response.oracle import ERROR_FLOOR
+from dynresp.response.search.full_search import ERROR_FLOOR
 
 
 def figures(
     ranked: npt.NDArray[Any], labels: npt.NDArray[Any], errors: npt.NDArray[Any]
 ) -> dict[str, float]:
-    """What `dynresp.learning.figures.measure` says."""
+    """What `dynresp.learning.choice_metrics.measure` says."""
     right, right2, within = 0, 0, 0
     regret, regret2 = 0.0, 0.0
     for row, label, error in zip(ranked, labels, errors, strict=True):
@@ -40,7 +40,7 @@ def in_use(
     carry_on: int,
     limit: float,
 ) -> list[list[int]]:
-    """What `dynresp.learning.figures.in_use` says."""
+    """What `dynresp.learning.choice_metrics.in_use` says."""
     found = []
     for row, error, graze in zip(ranked, errors, grazes, strict=True):
         reactions = [int(choice) for choice in row if choice != carry_on]
@@ -55,7 +55,7 @@ def in_use(
 
 
 def least_of_members(errors: npt.NDArray[Any], of: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """What `dynresp.learning.groups.Groups.errors` says."""
+    """What `dynresp.learning.class_groups.Groups.errors` says."""
     groups = int(of.max()) + 1
     return np.array(
         [[min(e for e, g in zip(row, of, strict=True) if g == k) for k in range(groups)]

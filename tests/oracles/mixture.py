@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dynresp.locomotion.clusters.mixture import Mixture
+from dynresp.locomotion.clusters.gaussian_mixture import Mixture
 from dynresp.motion.rotations import FloatArray
 
 

@@ -10,8 +10,8 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import MotionDatabase
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import FEET

@@ -1,7 +1,7 @@
 """Prediction as the definition has it, slow and readable.
 
-What `dynresp.response.prediction` must equal: the kernel with every support vector, one vote for
-each pair of classes, and a sort.
+What `dynresp.response.prediction.compiled_classifier` must equal: the kernel with every support
+vector, one vote for each pair of classes, and a sort.
 """
 
 from typing import Any

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.avatar.reentry import ReentryConfig
+from dynresp.locomotion.avatar.graph_entry import ReentryConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.rotations import FloatArray
 from tests.oracles.motion_graph import distance

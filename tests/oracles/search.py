@@ -1,6 +1,7 @@
 """The search along a path and its collision test, slow and readable.
 
-What `dynresp.locomotion.sketch.search` and `dynresp.locomotion.worlds` must equal on small graphs.
+What `dynresp.locomotion.sketch.path_search` and `dynresp.locomotion.worlds` must equal on small
+graphs.
 """
 
 import copy
@@ -12,9 +13,9 @@ import numpy as np
 
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.playing.avatar_state import State
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.playing.state import State
-from dynresp.locomotion.sketch.search import SearchConfig
+from dynresp.locomotion.sketch.path_search import SearchConfig
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion import rotations
 from dynresp.motion.character import Character

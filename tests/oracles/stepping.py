@@ -15,7 +15,6 @@ from unittest import mock
 import mujoco
 import numpy as np
 
-from dynresp import paths
 from dynresp.motion import rotations
 from dynresp.motion.character import JOINTS, POSE_SIZE, ROOT, ROOT_QUAT, VELOCITY_SIZE, Character
 from dynresp.motion.motion import pose_velocities
@@ -32,6 +31,7 @@ from dynresp.physics.scene import (
 )
 from dynresp.physics.servo import servo_gains
 from dynresp.physics.trace import Setup
+from dynresp.support import paths
 
 
 @dataclass

@@ -7,13 +7,13 @@ and feet that need not be drawn in.
 import numpy as np
 
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.playing.state import State
-from dynresp.locomotion.worlds.contacts import sole_corners
+from dynresp.locomotion.playing.avatar_state import State
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
+from dynresp.locomotion.worlds.world_contacts import sole_corners
 from dynresp.motion import rotations
-from dynresp.motion.arrays import BoolArray
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray
 
 
 def placed(sole: FloatArray, place: FloatArray) -> FloatArray:

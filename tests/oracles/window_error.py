@@ -1,4 +1,6 @@
-"""The exhaustive window search, slow and readable: what `dynresp.response.oracle` must equal.
+"""The exhaustive window search, slow and readable: the twin of the full search.
+
+`dynresp.response.search.full_search` must equal it.
 
 The window error itself is `dynresp.bench.window_error_twin`, which the benchmark of the installed
 package times; here is the search around it.
@@ -8,7 +10,7 @@ from collections.abc import Sequence
 
 from dynresp.bench.window_error_twin import error_surface
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.windows import ReactionTrack, WindowErrorConfig
+from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
 
 __all__ = ["best_match", "error_surface", "reaction_surface"]
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynresp.errors import DynrespError, SpecError
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character
 from dynresp.motion.motion import Motion
@@ -25,6 +24,7 @@ from dynresp.physics.impacts import (
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup, Trace
+from dynresp.support.errors import DynrespError, SpecError
 from tests.physics.conftest import SceneMaker
 from tests.physics.samples import punching, setups_of, simulation_of, standing, walking
 

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from dynresp.errors import DynrespError
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character
 from dynresp.motion.motion import Motion
@@ -14,6 +13,7 @@ from dynresp.physics.impacts import PreparedImpact, Strike, prepare
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig, Scene
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup
+from dynresp.support.errors import DynrespError
 from tests.physics.conftest import SceneMaker
 from tests.physics.samples import about_y, punching, setups_of, simulation_of, standing, turned
 from tests.physics.samples import walking as walk

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from dynresp.bench.oracle import synthetic_track
+from dynresp.bench.full_search_speed import synthetic_track
 from dynresp.motion import rotations
-from dynresp.response.alignment import Aligner, Alignment, AlignmentConfig
-from dynresp.response.windows import ReactionTrack, WindowErrorConfig
+from dynresp.response.alignment.alignment import Aligner, Alignment, AlignmentConfig
+from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
 from tests.oracles.alignment import Track, interpolated
 
 BODIES = 5

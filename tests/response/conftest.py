@@ -3,10 +3,10 @@
 import pytest
 
 from dynresp.motion.character import Character
-from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.physics.impacts import Impact, Strike
-from dynresp.response.respond import Responder
+from dynresp.response.responder import Responder
 from dynresp.response.response import Response
 from tests.physics.samples import punching, walking
 from tests.response.samples import HITS, bowing, leaning, tiny_library

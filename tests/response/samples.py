@@ -6,12 +6,12 @@ import numpy as np
 
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, Character
-from dynresp.motion.library import Reaction, ReactionLibrary
 from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import Reaction, ReactionLibrary
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball, Impact, Punch, Push
-from dynresp.response.crowd import Crowd
 from dynresp.response.response import Response
+from dynresp.response.runtime.crowd import Crowd
 from tests.physics.samples import about_y, turned
 
 # A ball so light that nobody feels it.

@@ -5,12 +5,12 @@ import time
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionError, SpecError
 from dynresp.motion.character import ROOT, Character
-from dynresp.motion.library import ReactionLibrary
 from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.physics.impacts import Ball
-from dynresp.response.dynamic import EventKind, Phase
+from dynresp.response.runtime.dynamic_responder import EventKind, Phase
+from dynresp.support.errors import MotionError, SpecError
 from tests.physics.samples import walking
 from tests.response.samples import FLUFF, WatchedCrowd
 

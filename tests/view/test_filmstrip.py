@@ -8,8 +8,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from dynresp.errors import DynrespError
 from dynresp.motion.motion import Motion
+from dynresp.support.errors import DynrespError
 from dynresp.view.filmstrip import FilmstripConfig, write_filmstrip
 from dynresp.view.story import Block, GroundPath, MovingCapsule, Story, StoryEvent
 from tests.view.samples import story_of, striding
@@ -104,8 +104,8 @@ def test_what_stands_is_in_the_lower_picture_and_the_picture_stays_small(tmp_pat
 
 def test_importing_the_views_imports_nothing_heavy() -> None:
     code = (
-        "import sys, dynresp.view.filmstrip, dynresp.view.recording, dynresp.view.video, "
-        "dynresp.view.plots; print(*{'matplotlib', 'viser', 'scipy', 'trimesh', 'PIL'} "
+        "import sys, dynresp.view.filmstrip, dynresp.view.recording, dynresp.view.video_writer, "
+        "dynresp.view.response_plots; print(*{'matplotlib', 'viser', 'scipy', 'trimesh', 'PIL'} "
         "& set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynresp.view import raster, shapes
+from dynresp.view import body_shapes as shapes
+from dynresp.view import raster
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 RED, GREEN = (0.9, 0.1, 0.1), (0.1, 0.9, 0.1)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.errors import DynrespError
+from dynresp.support.errors import DynrespError
 from dynresp.view.recording import write_recording
 from dynresp.view.story import Story, StoryEvent
 from tests.view.samples import striding

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionError, UnknownNameError
+from dynresp.support.errors import MotionError, UnknownNameError
 from dynresp.view.story import MovingCapsule, MovingSphere, Story, StoryEvent, StoryPhase, row_at
 from tests.view.samples import FPS, striding
 

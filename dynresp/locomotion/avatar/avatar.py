@@ -16,18 +16,18 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.avatar.reentry import ReentryPlanner, WayBack
+from dynresp.locomotion.avatar.graph_entry import ReentryPlanner, WayBack
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.walk import random_walk
-from dynresp.locomotion.playing.stream import Stream
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.graph.random_walk import random_walk
+from dynresp.locomotion.playing.frame_stream import Stream
 from dynresp.motion.character import Character
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.dynamic import DynamicResponder, Phase
+from dynresp.response.runtime.dynamic_responder import DynamicResponder, Phase
+from dynresp.support.arrays import IntArray
+from dynresp.support.errors import UsageError
 
 # Returns that are remembered.
 _RETURNS = 100

@@ -17,12 +17,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.choice.window import ChoiceWindow
-from dynresp.locomotion.clusters.forest import ClusterForest, ClusterTree
+from dynresp.locomotion.choice.action_window import ChoiceWindow
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates
-from dynresp.motion.arrays import BoolArray, IntArray, frozen
+from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray, IntArray, frozen
 
 # How far to look ahead without an upper bound in time [s]; if need be, half as far again.
 _NEAR_S = 4.0
@@ -194,7 +194,7 @@ class _Candidates:
         """The actions that are farthest from each other, at most as many as wanted."""
         if len(self.nodes) == 0:
             return []
-        from dynresp.locomotion.choice.dispersing_kernel import farthest_kernel
+        from dynresp.locomotion.choice.dispersal_kernel import farthest_kernel
 
         clusters, apart = self.tree.node_clusters[self.nodes], self.forest.clusters.apart
         probability = self.tree.log_probabilities[self.tree.node_visits[self.nodes]]

@@ -14,16 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import MotionDatabase
-from dynresp.motion import legs, rotations
-from dynresp.motion.arrays import BoolArray, IntArray, frozen
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.motion import rotations
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.contact_cases import ContactCase, contact_cases
+from dynresp.motion.feet import legs
+from dynresp.motion.feet.contact_cases import ContactCase, contact_cases
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray, IntArray, frozen
+from dynresp.support.errors import MotionError
 
 
 @dataclass(frozen=True)

@@ -33,10 +33,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import MotionDatabase
-from dynresp.locomotion.graph.distance import FrameFeatures, frame_features, quarter_turned
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.graph.frame_distance import FrameFeatures, frame_features, quarter_turned
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.support.arrays import IntArray
 
 _Single = npt.NDArray[np.float32]
 _Long = npt.NDArray[np.int64]
@@ -175,7 +175,7 @@ class _Search:
 
     def jumps(self, rows: tuple[int, int]) -> _Lot:
         """Pairs of steps that the rules leave in some rows of the matrix."""
-        from dynresp.locomotion.graph.distance_kernel import close_pairs
+        from dynresp.locomotion.graph.frame_distance_kernel import close_pairs
         from dynresp.locomotion.graph.pruning_kernel import keep_best_of_neighbours
 
         # One more row on both sides, where neighbours of the pairs are.
@@ -234,7 +234,7 @@ def _count_pairs(groups: _Long, clip_of: IntArray, stutter: int) -> int:
 
 def _packed(features: FrameFeatures, frames: IntArray) -> tuple[_Single, _Single]:
     """`packed` and `turned` of the kernel, in the order of the frames given."""
-    from dynresp.locomotion.graph.distance_kernel import LANES, PARTS
+    from dynresp.locomotion.graph.frame_distance_kernel import LANES, PARTS
 
     on_blocks = features.config.coordinates is Coordinates.BLOCKS
     packed = np.zeros((len(frames), PARTS, LANES), dtype=np.float32)
@@ -266,7 +266,7 @@ def _sketch(features: FrameFeatures, frames: IntArray) -> _Single:
     """
     from threadpoolctl import threadpool_limits
 
-    from dynresp.locomotion.graph.distance_kernel import SKETCH
+    from dynresp.locomotion.graph.frame_distance_kernel import SKETCH
 
     sketch = np.empty((SKETCH, len(frames)), dtype=np.float32)
     if len(frames) == 0:

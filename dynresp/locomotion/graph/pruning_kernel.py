@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numba import types
 
-from dynresp.compiling import compiled
+from dynresp.support.compiling import compiled
 
 _SIGNATURE = types.void(
     types.int64,

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError
 from dynresp.locomotion.graph.motion_graph import MotionGraph, between
 from dynresp.locomotion.graph.placement import IDENTITY, of_poses, place_poses, place_velocities
-from dynresp.motion.arrays import BoolArray, IntArray
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray, IntArray
+from dynresp.support.errors import MotionError
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.motion import legs, rotations
+from dynresp.motion import rotations
 from dynresp.motion.character import Character
+from dynresp.motion.feet import legs
+from dynresp.motion.feet.skating import TOUCH
 from dynresp.motion.ground import sole_points
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.skating import TOUCH
 
 # A frame nearer than that to an end of a step is as it is there, as part of the step.
 _ON = 1e-6

@@ -6,7 +6,7 @@ of the centre of mass. The action whose path is nearest to the sketch, by dynami
 taken.
 
 It suits worlds that have been clustered, where there is room for a few actions, such as the step
-stool. For long paths and obstacles take `dynresp.locomotion.sketch.following`.
+stool. For long paths and obstacles take `dynresp.locomotion.sketch.sketch_control`.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.clusters.forest import ClusterForest
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.warping import warp_onto_rows
+from dynresp.locomotion.vision.time_warping import warp_onto_rows
 from dynresp.locomotion.worlds.paths import as_path, check_length, resampled
-from dynresp.motion.arrays import IntArray
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import IntArray
+from dynresp.support.errors import UsageError
 
 # Points of a sketch that are compared with a path are so far apart [m].
 _SPACING = 0.1

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.graph.database import MotionDatabase
-from dynresp.locomotion.vision.table import ViewTable
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.vision.silhouette_table import ViewTable
+from dynresp.support.errors import UsageError
 
 # How the facing of the last moment is taken over to something new: a share goes to the neighbours
 # at each side, and a share anywhere.

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import types
 
-from dynresp.compiling import compiled
+from dynresp.support.compiling import compiled
 
 _TABLE = types.Array(types.float32, 3, "C", readonly=True)
 _ROW = types.Array(types.float32, 1, "C", readonly=True)

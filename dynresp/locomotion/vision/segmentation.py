@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError
+from dynresp.support.errors import MotionError
 
 Picture = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.uint8]

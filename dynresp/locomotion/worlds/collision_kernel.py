@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from dynresp.compiling import compiled
+from dynresp.support.compiling import compiled
 
 REALS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)

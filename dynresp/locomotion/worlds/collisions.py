@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.obstacles import World
-from dynresp.motion.arrays import BoolArray
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray
+from dynresp.support.errors import UsageError
 
 # Most boxes in the lists of all cells: 400 MB, and below the 2^31 that `CollisionGrid.starts` can
 # count.

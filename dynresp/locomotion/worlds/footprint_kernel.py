@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numba import njit, types
 
-from dynresp.compiling import compiled
 from dynresp.motion.kinematics_kernel import kinematics_kernel
+from dynresp.support.compiling import compiled
 
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 INTS = types.Array(types.int64, 1, "C", readonly=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
 from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
 from dynresp.motion.character import POSE_SIZE, Character, as_poses
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 # Half the thickness [m] of the walls that stand around a world: nobody gets to their far side.
 _RIM = 500.0

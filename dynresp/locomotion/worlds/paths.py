@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 LONGEST_M = 1_000.0
 """How long a path may be [m]: to walk a kilometre takes a quarter of an hour, and to fit it between

@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.worlds.contacts import palms, sole_corners, speeds, steady
-from dynresp.motion.arrays import BoolArray
+from dynresp.locomotion.worlds.world_contacts import palms, sole_corners, speeds, steady
 from dynresp.motion.character import Character
 from dynresp.motion.ground import ContactConfig
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray
+from dynresp.support.errors import UsageError
 
 # (name, one end, the other end) of each bar [m], in the world of the motions as they are loaded
 # with flat_floor=False: the ground is at height 0.

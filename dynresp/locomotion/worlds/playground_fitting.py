@@ -17,19 +17,20 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.graph.config import Coordinates
+from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.composing import Composition, at_rate, compose, standing
-from dynresp.locomotion.worlds.contacts import PALM, palms
+from dynresp.locomotion.playing.composition import Composition, at_rate, compose, standing
 from dynresp.locomotion.worlds.playground import Playground, recorded_playground
 from dynresp.locomotion.worlds.terrain_fitting import smoothed
 from dynresp.locomotion.worlds.terrain_graph import runs
-from dynresp.motion import legs, rotations
+from dynresp.locomotion.worlds.world_contacts import PALM, palms
+from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
-from dynresp.motion.foot_fitting import FitConfig
+from dynresp.motion.feet import legs
+from dynresp.motion.feet.foot_fitting import FitConfig
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 # A frame in the middle of a blend still tells a little where a hand holds.
 _LEAST_WEIGHT = 1e-3

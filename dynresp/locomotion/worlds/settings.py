@@ -7,7 +7,7 @@ import math
 from numbers import Integral, Real
 from typing import Any
 
-from dynresp.errors import UsageError
+from dynresp.support.errors import UsageError
 
 _KINDS: dict[str, tuple[type, str]] = {
     "float": (Real, "a finite number"),

@@ -13,14 +13,14 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.worlds.contacts import feet_on, sole_corners
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, box_distance
-from dynresp.motion.arrays import BoolArray
+from dynresp.locomotion.worlds.world_contacts import feet_on, sole_corners
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.ground import ContactConfig
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import BoolArray
 
 SIDE_M = 0.32
 """Length, width and height of the stool [m]."""

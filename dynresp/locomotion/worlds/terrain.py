@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.worlds.contacts import heights_above
+from dynresp.locomotion.worlds.world_contacts import heights_above
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 BLOCK_M = 0.6096
 """Side of a block [m]: 24 inches."""

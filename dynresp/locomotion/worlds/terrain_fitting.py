@@ -14,19 +14,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.playing.composing import Composition, compose
-from dynresp.locomotion.worlds.contacts import sole_corners
+from dynresp.locomotion.playing.composition import Composition, compose
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph, runs
 from dynresp.locomotion.worlds.terrain_walk import TerrainWalk
-from dynresp.motion import legs, rotations
-from dynresp.motion.arrays import LongArray
+from dynresp.locomotion.worlds.world_contacts import sole_corners
+from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
-from dynresp.motion.foot_fitting import FitConfig
+from dynresp.motion.feet import legs
+from dynresp.motion.feet.foot_fitting import FitConfig
+from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.skating import foot_slides
+from dynresp.support.arrays import LongArray
+from dynresp.support.errors import UsageError
 
 _FIT = FitConfig(farthest=0.4, deepest=0.12)
 

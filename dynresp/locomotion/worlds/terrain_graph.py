@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError, UsageError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates
+from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.worlds.contacts import sole_corners
 from dynresp.locomotion.worlds.terrain import Terrain
-from dynresp.motion.arrays import LongArray
+from dynresp.locomotion.worlds.world_contacts import sole_corners
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import LongArray
+from dynresp.support.errors import MotionError, UsageError
 
 # A sole is flat if its heel is no higher than its ball by this [m], and the other way round.
 _FLAT = 0.03

@@ -19,16 +19,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.walk import check_in_component
-from dynresp.locomotion.playing.state import State
+from dynresp.locomotion.graph.random_walk import check_in_component
+from dynresp.locomotion.playing.avatar_state import State
 from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled, window_m
 from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
-from dynresp.motion.arrays import LongArray
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import LongArray
+from dynresp.support.errors import UsageError
 
 # Distance of the points of a path [m].
 _SPACING = 0.1

@@ -18,9 +18,9 @@ import numpy as np
 from numba import njit, types
 from numba.typed import Dict
 
-from dynresp.compiling import compiled
-from dynresp.growing import doubled
 from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
+from dynresp.support.compiling import compiled
+from dynresp.support.growing_kernel import doubled
 
 (
     PACE, STRAY, JUMP, HASTE, HURRY, STRETCH, DRAW, FACING, AHEAD, FARTHEST,

@@ -6,7 +6,7 @@ and the feet are locked where they stand (`footing`). A course is planned step b
 (`course_plan`), and balance moves the body over its feet (`course`).
 """
 
-from dynresp.motion.builtin.motions import (
+from dynresp.motion.builtin.builtin_motions import (
     FLAT,
     PREFIX,
     BuiltinInfo,

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from dynresp.errors import UnknownNameError
 from dynresp.motion.builtin.posture_spec import Posture, Side, Strict
+from dynresp.support.errors import UnknownNameError
 
 Metres = Annotated[float, Field(ge=-3.0, le=3.0)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]

@@ -2,7 +2,7 @@
 
 A standing foot turns about a point of its sole that stays where it is: about the heel while the
 toes are up, about the ball while the heel is up. Legs reach their ankles by two-bone inverse
-kinematics (`dynresp.motion.legs`), so a foot that stands does not slide at all.
+kinematics (`dynresp.motion.feet.legs`), so a foot that stands does not slide at all.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.motion import ground, legs, rotations
+from dynresp.motion import ground, rotations
 from dynresp.motion.builtin.keypose_spec import Lying, Stance
 from dynresp.motion.character import Character
+from dynresp.motion.feet import legs
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 

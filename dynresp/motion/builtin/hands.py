@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from dynresp.motion import legs, rotations
+from dynresp.motion import rotations
 from dynresp.motion.builtin.keypose_spec import Prop
 from dynresp.motion.character import Character
+from dynresp.motion.feet import legs
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 

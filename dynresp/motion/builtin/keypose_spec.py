@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
-from dynresp.errors import SpecError, UnknownNameError
 from dynresp.motion.builtin.course_spec import Course, Jump, Stay, Step
 from dynresp.motion.builtin.posture_spec import (
     CHANNELS,
@@ -25,7 +24,8 @@ from dynresp.motion.builtin.posture_spec import (
     Strict,
     Trunk,
 )
-from dynresp.motion.strategies import Strategy
+from dynresp.motion.reactions.strategies import Strategy
+from dynresp.support.errors import SpecError, UnknownNameError
 
 Kind = Literal["walk", "idle", "guard", "punch", "locomotion", "reaction", "get_up"]
 

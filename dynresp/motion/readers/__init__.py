@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.readers.asf_amc import read_asf_amc
 from dynresp.motion.readers.bvh import read_bvh
 from dynresp.motion.readers.deepmimic import read_deepmimic
 from dynresp.motion.readers.skeleton import SkeletonMotion
 from dynresp.motion.readers.text import fail
+from dynresp.support.errors import MotionFileError
 
 __all__ = [
     "SUFFIXES",

@@ -1,6 +1,6 @@
 """The product's own motion file: a NumPy `.npz` archive of plain arrays, format version 1.
 
-An archive (`dynresp.archive`) of exactly these members, written by
+An archive (`dynresp.support.archive`) of exactly these members, written by
 `dynresp.motion.export.write_npz` and readable with `numpy.load(path, allow_pickle=False)`:
 
 ==================  =======  ============  =======================================================
@@ -26,11 +26,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.archive import TEXT, ArchiveFormat
-from dynresp.errors import MotionError, MotionFileError
 from dynresp.motion.character import POSE_SIZE, Character, default_character
 from dynresp.motion.motion import Label, Motion
 from dynresp.motion.readers.text import MAX_FILE_BYTES, fail
+from dynresp.support.archive import TEXT, ArchiveFormat
+from dynresp.support.errors import MotionError, MotionFileError
 
 FORMAT_VERSION = 1
 """Version of the format that is written, and the only one that is read."""

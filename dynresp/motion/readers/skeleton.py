@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError
 from dynresp.motion.rotations import FloatArray, conjugate, multiply, normalize, rotate
+from dynresp.support.errors import MotionError
 
 MAX_JOINTS = 1024
 """Most joints of a skeleton, end sites included."""

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import MotionFileError
 
 MAX_FILE_BYTES = 128 * 2**20
 """Largest motion file that is read [bytes]; text of MAX_POSES takes about as much."""

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.errors import MotionError, MotionFileError
 from dynresp.motion.readers.skeleton import SkeletonMotion, forward_kinematics
 from dynresp.motion.readers.text import fail
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import MotionError, MotionFileError
 
 UNITS = (1.0, 0.01, 0.0254, 0.001, 0.0254 / 0.45)
 """Units found by size [m]: metre, centimetre, inch, millimetre, and CMU's 1/0.45 inch."""

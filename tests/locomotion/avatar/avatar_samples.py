@@ -3,12 +3,12 @@
 import numpy as np
 
 from dynresp.locomotion.avatar.avatar import Doing, Wanderer
-from dynresp.locomotion.avatar.crowd import AvatarCrowd
+from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import ROOT, Character
-from dynresp.motion.library import ReactionLibrary
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.dynamic import Phase
+from dynresp.response.runtime.dynamic_responder import Phase
 
 
 class Watched:

@@ -4,20 +4,20 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Doing
-from dynresp.locomotion.avatar.crowd import AvatarCrowd
-from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
+from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
-from dynresp.motion.floor import raise_above
-from dynresp.motion.library import BUILTIN, ReactionLibrary, load_library
+from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import BUILTIN, ReactionLibrary, load_library
+from dynresp.motion.retargeting.floor import raise_above
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.skating import foot_slides
 from dynresp.physics.impacts import Ball, Impact, Push
-from dynresp.response.dynamic import EventKind, Phase
+from dynresp.response.runtime.dynamic_responder import EventKind, Phase
+from dynresp.support.errors import UsageError
 from tests.locomotion.avatar.avatar_samples import Watched, root_steps
 from tests.locomotion.samples import walking_graph
 from tests.physics.samples import walking

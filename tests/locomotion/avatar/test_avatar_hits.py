@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from dynresp.locomotion.avatar.avatar import Doing
-from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
-from dynresp.motion.library import BUILTIN, ReactionLibrary, load_library
 from dynresp.motion.load import LoadOptions, load_motion
+from dynresp.motion.reactions.reaction_library import BUILTIN, ReactionLibrary, load_library
 from dynresp.physics.impacts import Ball, Impact, Punch, Push
 from tests.locomotion.avatar.avatar_samples import Watched, root_steps
 from tests.locomotion.samples import walking_graph

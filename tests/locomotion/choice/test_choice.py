@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
+from dynresp.locomotion.choice.action_window import Box, ChoiceWindow, Disc
 from dynresp.locomotion.choice.actions import OfferedAction, choices
-from dynresp.locomotion.choice.control import ChoiceControl
-from dynresp.locomotion.choice.window import Box, ChoiceWindow, Disc
-from dynresp.locomotion.clusters.forest import ClusterForest
-from dynresp.locomotion.clusters.grouping import Clusters
+from dynresp.locomotion.choice.choice_control import ChoiceControl
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
+from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates
-from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.graph.graph_config import Coordinates
+from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.motion.character import Character, default_character
+from dynresp.support.errors import UsageError
 from tests.locomotion.clusters.forest_samples import random_forest
 from tests.locomotion.samples import planned_graph, walking_graph
 from tests.oracles import choice as slow

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from dynresp.locomotion.clusters.forest import ClusterForest
-from dynresp.locomotion.clusters.grouping import Clusters
-from dynresp.locomotion.clusters.mixture import Mixture
-from dynresp.locomotion.graph.config import GraphConfig
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
+from dynresp.locomotion.clusters.frame_clusters import Clusters
+from dynresp.locomotion.clusters.gaussian_mixture import Mixture
+from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph, PruningCounts
 from tests.locomotion.graph.graph_samples import made_database
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dynresp.locomotion.graph.database import Clip, MotionDatabase
+from dynresp.locomotion.graph.frame_database import Clip, MotionDatabase
 from dynresp.motion import rotations
 from dynresp.motion.character import POSE_SIZE
 from dynresp.motion.rotations import FloatArray

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynresp.errors import MotionError, UsageError
 from dynresp.locomotion.graph import placement, pruning
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import MotionDatabase
-from dynresp.locomotion.graph.distance import JOINT_WEIGHTS
+from dynresp.locomotion.graph.frame_database import MotionDatabase
+from dynresp.locomotion.graph.frame_distance import JOINT_WEIGHTS
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph, keeps_its_feet
 from dynresp.locomotion.graph.pruning import Transitions, find_transitions
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
+from dynresp.support.errors import MotionError, UsageError
 from tests.locomotion.graph.graph_samples import made_database
 from tests.locomotion.samples import walking_graph, walking_motions
 from tests.oracles import motion_graph as oracle

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynresp.errors import GraphFileError
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.file import FORMAT, graph_identity, load_graph, save_graph
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.graph_file import FORMAT, graph_identity, load_graph, save_graph
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character, default_character
+from dynresp.support.errors import GraphFileError
 from tests.locomotion.samples import walking_graph, walking_motions
 
 

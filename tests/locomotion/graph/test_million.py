@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynresp.avatar_runs.graph_building import build_graph
+from dynresp.avatar_runs.graph_spec import find_plan, read_plan
 from dynresp.bench.graph_steps import at_jumps, source_limits
-from dynresp.graphs.building import build_graph
-from dynresp.graphs.plan import find_plan, read_plan
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.playing.composing import compose
-from dynresp.motion.arrays import IntArray
+from dynresp.locomotion.playing.composition import compose
 from dynresp.motion.character import Character, default_character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import Motion
-from dynresp.motion.skating import foot_skates
+from dynresp.support.arrays import IntArray
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynresp.locomotion.graph import pruning
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.database import Clip, MotionDatabase
-from dynresp.locomotion.graph.distance import JOINT_WEIGHTS, frame_distances, frame_features
+from dynresp.locomotion.graph.frame_database import Clip, MotionDatabase
+from dynresp.locomotion.graph.frame_distance import JOINT_WEIGHTS, frame_distances, frame_features
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.pruning import find_transitions, step_groups
 from tests.locomotion.graph.graph_samples import made_database, wandering_poses
 from tests.oracles import motion_graph as oracle

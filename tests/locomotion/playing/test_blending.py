@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dynresp.errors import MotionError
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import place_poses
-from dynresp.locomotion.graph.walk import random_walk
+from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import angle_between
+from dynresp.support.errors import MotionError
 from tests.locomotion.samples import walking_graph
 from tests.oracles import playback as oracle
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.sketch.cluster_paths import SketchChooser
 from dynresp.motion.character import Character
+from dynresp.support.errors import UsageError
 from tests.locomotion.clusters.forest_samples import random_forest
 from tests.oracles import warping as oracle
 

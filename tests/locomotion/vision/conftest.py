@@ -1,8 +1,8 @@
 import pytest
 
-from dynresp.locomotion.clusters.forest import ClusterForest
-from dynresp.locomotion.vision.recognition import Recogniser
-from dynresp.locomotion.vision.table import ViewTable
+from dynresp.locomotion.clusters.cluster_forest import ClusterForest
+from dynresp.locomotion.vision.action_recognition import Recogniser
+from dynresp.locomotion.vision.silhouette_table import ViewTable
 from dynresp.motion.character import default_character
 from tests.locomotion.vision.samples import acting_forest
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.vision.belief import Belief, BeliefConfig
+from dynresp.locomotion.vision.silhouette_table import ViewTable
 from dynresp.locomotion.vision.silhouettes import Viewpoints
-from dynresp.locomotion.vision.table import ViewTable
+from dynresp.support.errors import UsageError
 from tests.locomotion.graph.graph_samples import made_database
 from tests.oracles import belief as oracle
 

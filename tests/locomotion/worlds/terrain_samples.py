@@ -4,8 +4,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M
-from dynresp.motion import legs, rotations
+from dynresp.motion import rotations
 from dynresp.motion.character import Character
+from dynresp.motion.feet import legs
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 

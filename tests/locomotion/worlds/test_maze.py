@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
 from dynresp.locomotion.worlds.paths import resampled
+from dynresp.support.errors import UsageError
 
 
 @pytest.mark.parametrize("narrow", [0.0, 0.5])

@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.footprints import footprints
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
+from dynresp.support.errors import UsageError
 from tests.locomotion.graph.graph_samples import wandering_poses
 from tests.oracles import search as oracle
 

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
 from dynresp.locomotion.worlds.path_kernel import nearest_on
 from dynresp.locomotion.worlds.paths import (
     as_path,
@@ -11,6 +10,7 @@ from dynresp.locomotion.worlds.paths import (
     resampled,
     window_m,
 )
+from dynresp.support.errors import UsageError
 
 
 def test_distances_to_a_path() -> None:

@@ -3,19 +3,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.worlds.contacts import palms, sole_corners
 from dynresp.locomotion.worlds.playground import (
     Bar,
     Playground,
     playground_contacts,
     recorded_playground,
 )
+from dynresp.locomotion.worlds.world_contacts import palms, sole_corners
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
 
 FPS = 30.0
 

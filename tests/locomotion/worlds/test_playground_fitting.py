@@ -5,12 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.walk import random_walk
-from dynresp.locomotion.playing.composing import Composition, compose
-from dynresp.locomotion.worlds.contacts import palms
+from dynresp.locomotion.graph.random_walk import random_walk
+from dynresp.locomotion.playing.composition import Composition, compose
 from dynresp.locomotion.worlds.playground import Bar, Playground, playground_contacts
 from dynresp.locomotion.worlds.playground_fitting import (
     HandFitConfig,
@@ -18,12 +16,14 @@ from dynresp.locomotion.worlds.playground_fitting import (
     find_holds,
     grips,
 )
+from dynresp.locomotion.worlds.world_contacts import palms
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.motion.skating import foot_skates
+from dynresp.support.errors import UsageError
 
 FPS = 30.0
 FIXED = GraphConfig(coordinates=Coordinates.FIXED, contact_change=False, sigma=1.0)

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynresp.errors import UsageError
-from dynresp.locomotion.sketch.search import SearchConfig
-from dynresp.locomotion.sketch.walking import SketchConfig
+from dynresp.locomotion.sketch.path_search import SearchConfig
+from dynresp.locomotion.sketch.path_walk import SketchConfig
 from dynresp.locomotion.worlds.maze import MazeConfig
-from dynresp.locomotion.worlds.planning import PlanningConfig
+from dynresp.locomotion.worlds.path_planning import PlanningConfig
 from dynresp.locomotion.worlds.terrain_walk import TerrainWalkConfig
+from dynresp.support.errors import UsageError
 
 ALL = (SearchConfig, SketchConfig, PlanningConfig, MazeConfig, TerrainWalkConfig)
 

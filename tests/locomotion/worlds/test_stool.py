@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, binary_erosion
 
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.worlds.contacts import standing_soles
 from dynresp.locomotion.worlds.obstacles import body_clearances
 from dynresp.locomotion.worlds.stool import (
     SIDE_M,
@@ -13,11 +12,12 @@ from dynresp.locomotion.worlds.stool import (
     stool_motions,
     stool_world,
 )
+from dynresp.locomotion.worlds.world_contacts import standing_soles
 from dynresp.motion import rotations
 from dynresp.motion.builtin import FLAT, PREFIX, load_builtin
 from dynresp.motion.character import Character
+from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import Motion
-from dynresp.motion.skating import foot_skates
 
 
 @pytest.fixture(scope="module")

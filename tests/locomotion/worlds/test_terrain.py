@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionError, UsageError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.worlds.blocks import fit_blocks, onto_blocks
-from dynresp.locomotion.worlds.contacts import (
+from dynresp.locomotion.worlds.recorded_terrain import fit_blocks, onto_blocks
+from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
+from dynresp.locomotion.worlds.world_contacts import (
     feet_on,
     find_stances,
     heights_above,
@@ -18,10 +18,10 @@ from dynresp.locomotion.worlds.contacts import (
     standing_soles,
     steady,
 )
-from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
 from dynresp.motion.character import Character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
+from dynresp.support.errors import MotionError, UsageError
 from tests.locomotion.worlds.terrain_samples import FPS, block_walk, footprint
 
 LEVELS = np.array([[0, 2, 3, 1], [4, 6, 0, 2], [3, 5, 4, 0], [1, 0, 2, 5]])

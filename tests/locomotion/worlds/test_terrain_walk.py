@@ -3,14 +3,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionError, UsageError
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.state import State
-from dynresp.locomotion.worlds.blocks import onto_blocks
-from dynresp.locomotion.worlds.contacts import feet_on, sole_corners
+from dynresp.locomotion.playing.avatar_state import State
 from dynresp.locomotion.worlds.paths import distances_to
+from dynresp.locomotion.worlds.recorded_terrain import onto_blocks
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
 from dynresp.locomotion.worlds.terrain_fitting import (
     TerrainFitConfig,
@@ -28,9 +26,11 @@ from dynresp.locomotion.worlds.terrain_walk import (
     start_on_terrain,
     wander_on_terrain,
 )
+from dynresp.locomotion.worlds.world_contacts import feet_on, sole_corners
 from dynresp.motion.character import Character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
+from dynresp.support.errors import MotionError, UsageError
 from tests.locomotion.worlds.terrain_samples import block_walk, footprint
 from tests.oracles import terrain_walk as slow
 

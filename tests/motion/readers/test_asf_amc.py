@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.readers import read_asf_amc
 from dynresp.motion.readers.skeleton import SkeletonMotion
+from dynresp.support.errors import MotionFileError
 from tests.motion.readers.samples import ASF_PERSON, amc_person, write_amc_person
 from tests.oracles.asf_amc import bone_starts
 

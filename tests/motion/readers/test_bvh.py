@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.readers import read_bvh
 from dynresp.motion.rotations import about_axis, multiply
+from dynresp.support.errors import MotionFileError
 from tests.motion.readers.samples import BVH_PERSON, BVH_PERSON_COLUMNS, bvh_person
 
 MOTIONS = os.environ.get("DYNRESP_MOTIONS", "")

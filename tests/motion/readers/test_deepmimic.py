@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.readers import read_deepmimic
 from dynresp.motion.rotations import angle_between, identity, slerp
+from dynresp.support.errors import MotionFileError
 from tests.motion.readers.samples import deepmimic_person, deepmimic_rows
 
 # Where a row holds what: time, root position, root rotation, ..., right knee, ..., right elbow.

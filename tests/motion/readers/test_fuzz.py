@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.readers import read_asf_amc, read_bvh, read_deepmimic
 from dynresp.motion.readers.skeleton import SkeletonMotion
+from dynresp.support.errors import MotionFileError
 from tests.motion.readers.samples import (
     ASF_PERSON,
     amc_person,

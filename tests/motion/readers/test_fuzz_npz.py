@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.character import Character
 from dynresp.motion.export import write_npz
 from dynresp.motion.motion import Label, Motion
 from dynresp.motion.readers.npz import read_npz
+from dynresp.support.errors import MotionFileError
 from tests.motion.readers.test_fuzz import BYTES_EACH, DAMAGES, SECONDS_EACH, no_longer_than
 from tests.motion.samples import smooth_motion
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.errors import MotionFileError
 from dynresp.motion.readers import read_motion_file, text
 from dynresp.motion.readers.text import rate_of_frame_time
 from dynresp.motion.readers.world import UNITS
+from dynresp.support.errors import MotionFileError
 from tests.motion.readers.samples import (
     ASF_PERSON,
     BVH_PERSON,

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynresp.errors import MotionError
 from dynresp.motion.readers import SkeletonMotion
 from dynresp.motion.rotations import about_axis, identity, normalize, rotate
+from dynresp.support.errors import MotionError
 
 
 def make(**changes: object) -> SkeletonMotion:

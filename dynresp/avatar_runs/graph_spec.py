@@ -1,0 +1,134 @@
+"""What a graph plan says: which motions, and how a graph is made of them (`docs/locomotion.md`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dynresp.experiments.experiment_spec import MotionCut, Strict
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.locomotion.worlds.terrain import LEVEL_M
+from dynresp.motion.sources.collection import GRAPHS
+from dynresp.specs.toml_errors import Layout, read_toml, validate
+from dynresp.specs.values import fixed
+from dynresp.support.errors import SpecError, UnknownNameError, UsageError
+from dynresp.support.paths import example_specs
+
+WorldName = Literal["flat", "terrain", "stool", "playground"]
+"""Where the motions were recorded; it says what counts as a contact."""
+
+
+_COORDINATES: dict[str, str] = {
+    "flat": "relative",
+    "terrain": "blocks",
+    "stool": "fixed",
+    "playground": "fixed",
+}
+
+
+class GraphTable(Strict):
+    """`[graph]`: its name, its world, and settings.
+
+    What is left out is as in `GraphConfig`, but for the coordinates, which go with the world.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    world: WorldName = "flat"
+    fps: Annotated[float | None, fixed(1.0, 240.0, "frames a second")] = None
+    mirrored: bool = False
+    coordinates: Literal["relative", "fixed", "blocks"] | None = None
+    contact_change: bool | None = None
+    slip_m: Annotated[float | None, fixed(0.0, 10.0, "m")] = None
+    local_maxima: bool | None = None
+    sigma: Annotated[float | None, fixed(1e-6, 1e3)] = None
+    least_probability: Annotated[float | None, fixed(1e-9, 0.999)] = None
+    velocity_weight: Annotated[float | None, fixed(0.0, 100.0)] = None
+    stutter_s: Annotated[float | None, fixed(0.0, 10.0, "s")] = None
+    blend_s: Annotated[float | None, fixed(0.01, 10.0, "s")] = None
+    blend_rate_s: Annotated[float | None, fixed(0.01, 10.0, "s")] = None
+
+    def config(self) -> GraphConfig:
+        """The settings.
+
+        Raises:
+            UsageError: They contradict each other.
+        """
+        said = self.model_dump(exclude={"name", "world"}, exclude_none=True)
+        said["coordinates"] = Coordinates(self.coordinates or _COORDINATES[self.world])
+        if self.world == "terrain":
+            said["block_height_m"] = LEVEL_M
+        if self.blend_s is not None and self.blend_rate_s is None:
+            said["blend_rate_s"] = min(self.blend_s, GraphConfig.blend_rate_s)
+        return GraphConfig(**said)
+
+
+class GraphPlan(Strict):
+    """A whole plan.
+
+    Motions under `leave_out` are not taken although a name with wildcards stands for them.
+    """
+
+    graph: GraphTable
+    motion: Annotated[list[MotionCut], Field(min_length=1, max_length=1000)]
+    leave_out: Annotated[list[str], Field(default_factory=list, max_length=1000)]
+
+
+_LAYOUT = Layout(
+    tables={(): GraphPlan, ("graph",): GraphTable, ("motion",): MotionCut},
+    hints={
+        "graph": "add [graph] with name",
+        "name": "say in a few words what the graph is of",
+        "motion": 'add [[motion]] with motion = "builtin:walk", a path inside a motions folder, or '
+        "one with * for several files",
+    },
+)
+
+
+def plans_folder() -> Path:
+    """Folder of the plans that come with dynresp."""
+    return example_specs(GRAPHS)
+
+
+def plan_names() -> tuple[str, ...]:
+    """Names of the plans that come with dynresp, sorted."""
+    return tuple(sorted(file.stem for file in plans_folder().glob("*.toml")))
+
+
+def find_plan(given: str) -> Path:
+    """The file of a plan.
+
+    Args:
+        given: The name of one that comes with dynresp, or a file (.toml).
+
+    Raises:
+        UnknownNameError: There is none of that name.
+    """
+    if given.endswith(".toml"):
+        return Path(given)
+    if given not in plan_names():
+        raise UnknownNameError("graph plan", given, [*plan_names(), "a plan file (.toml)"])
+    return plans_folder() / f"{given}.toml"
+
+
+def read_plan(path: Path | str) -> GraphPlan:
+    """Read a graph plan.
+
+    Args:
+        path: A TOML file.
+
+    Returns:
+        What it says, checked.
+
+    Raises:
+        SpecError: It cannot be read, is too large or not TOML, or says something that is not
+            allowed. The message names the file, the key, what was given and what is allowed.
+    """
+    content = read_toml(Path(path), "a graph plan")
+    plan = validate(GraphPlan, content, str(path), _LAYOUT)
+    try:
+        plan.graph.config()
+    except UsageError as error:
+        raise SpecError(f"{path}: [graph]: {error}") from None
+    return plan

@@ -1,0 +1,104 @@
+"""Where the pictures of somebody come from: a video file, or a camera in its own time."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from dynresp.locomotion.vision.segmentation import Picture
+from dynresp.locomotion.vision.video_reader import Video
+from dynresp.support.errors import DynrespError, UsageError
+
+_CAMERA = re.compile(r"camera(?::(\d{1,3}))?")
+
+Clock = Callable[[], float]
+"""Tells the time [s], from any moment on."""
+
+
+def open_source(text: str) -> tuple[Video, bool]:
+    """Open what the user named.
+
+    Args:
+        text: A video file, or "camera" or "camera:N".
+
+    Returns:
+        The open video, and whether it is a camera.
+
+    Raises:
+        UsageError: It is a camera of no number.
+        MotionFileError: It cannot be opened.
+        DynrespError: OpenCV is not there.
+    """
+    try:
+        import cv2  # noqa: F401
+    except ImportError as error:
+        raise DynrespError(
+            f"OpenCV, which reads videos, cannot be loaded ({error}); install it by "
+            "`pip install opencv-python-headless`"
+        ) from None
+    # FFmpeg would write to standard error as well what the errors here say.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    camera = _CAMERA.fullmatch(text)
+    if camera is not None:
+        return Video(int(camera[1] or 0)), True
+    if text.startswith("camera:"):
+        raise UsageError(
+            f"expected camera or camera:N, such as camera:1 for the second one, got {text[:60]!r}; "
+            "write ./ before the name of a file"
+        )
+    return Video(Path(text)), False
+
+
+def evenly(
+    pictures: Iterable[Picture], fps: float, clock: Clock = time.monotonic
+) -> Iterator[Picture]:
+    """Pictures of a camera as they come, at an even rate.
+
+    Cameras deliver fewer pictures than they say when it is dark, and none while the computer is
+    busy. A picture is given again until the next one is there, and one too many left out, so that
+    the number of pictures tells the time. After a break of a second or more, as of a computer that
+    slept, time goes on where it stopped.
+
+    Args:
+        pictures: What the camera delivers; each is waited for.
+        fps: The rate wanted [1/s].
+        clock: Tells the time.
+    """
+    begun: float | None = None
+    given = 0
+    for picture in pictures:
+        now = clock()
+        begun = now - 1.0 / fps if begun is None else begun
+        due = int((now - begun) * fps + 1e-6) - given
+        if due > fps:
+            begun += (due - 1) / fps
+            due = 1
+        for _ in range(due):
+            yield picture
+        given += max(due, 0)
+
+
+def later(
+    pictures: Iterable[Picture],
+    wait_s: float,
+    tell: Callable[[float], None],
+    clock: Clock = time.monotonic,
+) -> Iterator[Picture]:
+    """Pictures of a camera without those of the first seconds.
+
+    Args:
+        pictures: What the camera delivers.
+        wait_s: How long pictures are thrown away [s].
+        tell: Told how much of that time has passed [s].
+        clock: Tells the time.
+    """
+    begun = clock()
+    for picture in pictures:
+        passed = clock() - begun
+        if passed < wait_s:
+            tell(passed)
+        else:
+            yield picture

@@ -1,0 +1,50 @@
+"""Progress on standard error: a bar on a terminal, a line for each stage elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import typer
+
+from dynresp.support.progress import Progress
+
+
+@contextmanager
+def progress() -> Iterator[Progress]:
+    """What to tell progress to, while the block runs."""
+    if sys.stderr.isatty():
+        with _bar() as tell:
+            yield tell
+    else:
+        yield _lines()
+
+
+def _lines() -> Progress:
+    """A line whenever another stage begins."""
+    last = ""
+
+    def tell(stage: str, done: int, of: int) -> None:
+        nonlocal last
+        if stage != last:
+            typer.echo(f"{stage} ...", err=True)
+            last = stage
+
+    return tell
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task("starting", total=None)
+
+        def tell(stage: str, done: int, of: int) -> None:
+            bars.update(task, description=stage, completed=done, total=max(of, 1))
+
+        yield tell

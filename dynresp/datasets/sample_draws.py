@@ -1,0 +1,114 @@
+"""From a plan to its samples: which base motion, what hits it, when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynresp.datasets.dataset_spec import DatasetPlan, PlannedImpact
+from dynresp.experiments.drawn_hits import draw_hits
+from dynresp.experiments.experiment_spec import PushTable
+from dynresp.physics.impacts import Impact, flight_s
+from dynresp.specs.values import Choice, Number, Uniform, draw
+from dynresp.support.errors import SpecError
+
+GOES_ON_S = 1.0
+"""A base motion goes on at least this long after a hit [s], so that the servos have what to track
+while the simulation looks ahead."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One hit of a plan.
+
+    Attributes:
+        index: Its place in the dataset, from 0.
+        base: Which `[[base]]` of the plan is hit, from 0.
+        table: Which `[[impact]]` of the plan it was drawn from, from 0.
+        phase: When, as a share of the time at which it can come.
+        asked: The impact's keys and the values drawn; units stand in the keys.
+        impact: The same for the simulation.
+    """
+
+    index: int
+    base: int
+    table: int
+    phase: float
+    asked: dict[str, Any]
+    impact: Impact
+
+
+def draw_sample(plan: DatasetPlan, durations: Sequence[float], index: int) -> Sample:
+    """Draw a sample.
+
+    It depends on the plan, its seed and the index alone, not on how many there are.
+
+    Args:
+        plan: The plan.
+        durations: How long each base motion lasts [s].
+        index: Which sample, from 0.
+    """
+    rng = np.random.default_rng((plan.plan.seed, index))
+    base = _pick([item.weight for item in plan.base], rng)
+    table = _pick([item.weight for item in plan.impact], rng)
+    planned = plan.impact[table]
+    phase = float(draw(planned.phase, rng))
+    keys = [key for key in type(planned.hit).model_fields if key != "time_s"]
+    asked = {key: draw(getattr(planned.hit, key), rng) for key in keys}
+    lead = lead_s(asked.get("radius_m", 0.0), asked.get("speed_m_s"))
+    asked["time_s"] = lead + phase * (durations[base] - GOES_ON_S - lead)
+    # With all its values drawn, the table is that of an experiment of one hit.
+    (hit,) = draw_hits(planned.hit.model_copy(update=asked), 0, range(1))
+    return Sample(index, base, table, phase, asked, hit.impact)
+
+
+def _pick(weights: Sequence[float], rng: np.random.Generator) -> int:
+    """One of several, as often as its weight says."""
+    bounds = np.cumsum(weights)
+    # The last bound can be below the sum by rounding.
+    found = int(np.searchsorted(bounds, rng.random() * bounds[-1], side="right"))
+    return min(found, len(weights) - 1)
+
+
+def lead_s(radius: float, speed: float | None) -> float:
+    """How long before an impact its simulation begins [s], as `physics.impacts.prepare` has it.
+
+    Args:
+        radius: Of a ball or a fist [m].
+        speed: Of a ball or a fist [m/s]; None for a push.
+    """
+    return 0.0 if speed is None else flight_s(radius, speed)
+
+
+def check_durations(plan: DatasetPlan, durations: Sequence[float]) -> None:
+    """Refuse base motions that are too short for the plan's impacts, before any work.
+
+    Raises:
+        SpecError: Names the base motion, how long it lasts and how long it should.
+    """
+    needed = GOES_ON_S + max(_longest_lead_s(planned) for planned in plan.impact)
+    for base, duration in zip(plan.base, durations, strict=True):
+        if duration < needed:
+            raise SpecError(
+                f"base: {base.title!r} lasts {duration:.2f} s; with these impacts a base motion "
+                f"must last at least {needed:.2f} s, {GOES_ON_S:g} s of it after the hit"
+            )
+
+
+def _longest_lead_s(planned: PlannedImpact) -> float:
+    hit = planned.hit
+    if isinstance(hit, PushTable):
+        return lead_s(0.0, None)
+    return lead_s(_ends(hit.radius_m)[1], _ends(hit.speed_m_s)[0])
+
+
+def _ends(value: Number) -> tuple[float, float]:
+    """Least and greatest that a number can be."""
+    if isinstance(value, Uniform):
+        return value.low, value.high
+    if isinstance(value, Choice):
+        return min(value.values), max(value.values)
+    return value, value

@@ -1,0 +1,137 @@
+"""Which classifier an experiment chooses with, and what it does for want of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dynresp.experiments.experiment_spec import ChoiceTable
+from dynresp.experiments.response_settings import in_force
+from dynresp.motion.character import Character
+from dynresp.motion.reactions.reaction_library import BUILTIN, RECORDED, ReactionLibrary
+from dynresp.response.budget import chooser_for
+from dynresp.response.choice import Chooser
+from dynresp.response.prediction.classifier import Classifier, ClassifierError, TrainedFor
+from dynresp.response.prediction.classifier_file import load_classifier
+from dynresp.response.response import ResponseConfig
+from dynresp.support.errors import SpecError
+from dynresp.support.paths import classifier_file, expanded, models_folder
+
+SHIPPED = (BUILTIN, *RECORDED)
+"""Names of the libraries for which a classifier is shipped."""
+
+
+@dataclass(frozen=True)
+class Choosing:
+    """What chooses in an experiment.
+
+    Attributes:
+        chooser: It.
+        about: What `result.json` says of it.
+    """
+
+    chooser: Chooser
+    about: dict[str, Any]
+
+
+def take_chooser(
+    table: ChoiceTable,
+    character: Character,
+    library: ReactionLibrary,
+    config: ResponseConfig,
+    beside: Path,
+) -> Choosing:
+    """Make what an experiment asks for.
+
+    For want of a classifier for the library, the oracle chooses.
+
+    Args:
+        table: The experiment's `[choice]`.
+        character: The character.
+        library: Its reactions.
+        config: Settings.
+        beside: Folder of the experiment file, from which a relative path counts.
+
+    Raises:
+        SpecError: A classifier is named, but the oracle is to choose.
+        ClassifierError: A classifier's file is damaged, or it was trained for something else.
+        MotionError: A clip of the library is shorter than a window.
+    """
+    budget = table.budget
+    if budget == "best" and table.classifier is not None:
+        raise SpecError(
+            'choice: with the budget "best" the oracle chooses, and no classifier; leave out '
+            "classifier, or take another budget"
+        )
+    about: dict[str, Any] = {"budget": budget}
+    classifier = None
+    if budget != "best":
+        named = None if table.classifier is None else beside / expanded(table.classifier, "choice")
+        try:
+            classifier = find_classifier(library, character, named)
+        except ClassifierError as error:
+            if named is not None:
+                raise
+            # Nobody named the file that was kept; what is shipped is as it should be.
+            about["passed_over"] = str(error)
+            classifier = _shipped(library, character)
+        if classifier is None:
+            about = {**about, "budget": "best", "instead_of": budget}
+            budget = "best"
+    if classifier is not None:
+        about["classifier"] = _about(classifier, config)
+    return Choosing(chooser_for(budget, character, library, config, classifier), about)
+
+
+def find_classifier(
+    library: ReactionLibrary, character: Character, named: Path | None = None
+) -> Classifier | None:
+    """The classifier for a library: a named one, this user's own, or the one that is shipped.
+
+    Args:
+        library: The reactions.
+        character: Their character.
+        named: File that the user named.
+
+    Returns:
+        None where none is named and there is none.
+
+    Raises:
+        ClassifierError: The file is damaged, or was trained for something else.
+    """
+    kept = classifier_file(library.identity)
+    if named is not None or kept.is_file():
+        classifier = load_classifier(named or kept)
+        classifier.check(TrainedFor.of(library, character))
+        return classifier
+    return _shipped(library, character)
+
+
+def _shipped(library: ReactionLibrary, character: Character) -> Classifier | None:
+    if library.name not in SHIPPED:
+        return None
+    shipped = load_classifier(shipped_classifier(library.name))
+    # Another library may bear the name of one of ours.
+    return shipped if shipped.trained_for == TrainedFor.of(library, character) else None
+
+
+def shipped_classifier(library: str) -> Path:
+    """The file of the classifier that is shipped for a library.
+
+    Args:
+        library: One of `SHIPPED`.
+    """
+    return models_folder() / f"{library}.skops"
+
+
+def _about(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "classes": len(classifier.classes),
+        "features": len(classifier.feature_names),
+        "trained_on": classifier.trained_on.samples,
+        "dataset": classifier.trained_on.dataset,
+    }
+    # Trained with other settings it predicts what the oracle would have chosen with those.
+    differing = classifier.differing_settings(in_force(config))
+    return {**told, "other_settings": differing} if differing else told

@@ -1,0 +1,94 @@
+"""From the table of an impact to hits: random values drawn, units taken off the names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynresp.experiments.experiment_spec import (
+    BallTable,
+    ImpactTable,
+    PunchTable,
+    PushTable,
+    StrikeTable,
+)
+from dynresp.motion.motion import Motion
+from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
+from dynresp.specs.values import draw
+
+
+@dataclass(frozen=True)
+class Hit:
+    """One hit of an experiment.
+
+    Attributes:
+        number: Its place in the experiment, from 0.
+        asked: The impact's keys and the values drawn for this hit; units stand in the keys.
+        impact: The same for the simulation.
+    """
+
+    number: int
+    asked: dict[str, Any]
+    impact: Impact
+
+
+def draw_hits(
+    table: ImpactTable,
+    seed: int,
+    numbers: range,
+    strike: Motion | None = None,
+    strike_s: float = 0.0,
+    side: str = "right",
+) -> list[Hit]:
+    """Draw hits.
+
+    A hit depends on the seed and its own number alone, not on how many there are.
+
+    Args:
+        table: The impact, with ranges where values are random.
+        seed: Seed of the experiment.
+        numbers: Which hits.
+        strike: The second character's motion, where the impact is a strike.
+        strike_s: When the fist meets the target in it [s].
+        side: The arm that strikes.
+    """
+    hits = []
+    for n in numbers:
+        rng = np.random.default_rng((seed, n))
+        keys = [key for key in type(table).model_fields if key != "striker"]
+        asked = {key: draw(getattr(table, key), rng) for key in keys}
+        hits.append(Hit(n, asked, _impact(table, asked, strike, strike_s, side)))
+    return hits
+
+
+def _impact(
+    table: ImpactTable, asked: dict[str, Any], strike: Motion | None, strike_s: float, side: str
+) -> Impact:
+    time, bearing, target = asked["time_s"], asked["from_deg"], asked["target"]
+    if isinstance(table, BallTable | PunchTable):
+        kind = Ball if isinstance(table, BallTable) else Punch
+        return kind(
+            time=time,
+            speed=asked["speed_m_s"],
+            mass=asked["mass_kg"],
+            radius=asked["radius_m"],
+            from_deg=bearing,
+            elevation_deg=asked["elevation_deg"],
+            target=target,
+            height=asked["height_m"],
+            offset=asked["offset_m"],
+        )
+    if isinstance(table, PushTable):
+        return Push(
+            time=time,
+            force=asked["force_n"],
+            duration=asked["duration_s"],
+            from_deg=bearing,
+            elevation_deg=asked["elevation_deg"],
+            target=target,
+        )
+    assert isinstance(table, StrikeTable)
+    assert strike is not None
+    return Strike(time, strike, strike_s, side, bearing, target)

@@ -1,0 +1,224 @@
+"""Finding, loading and cutting the motions that an experiment names."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dynresp.experiments.experiment_spec import MotionCut
+from dynresp.motion.builtin import load_builtin
+from dynresp.motion.character import Character
+from dynresp.motion.load import LoadOptions, load_motion
+from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import (
+    BUILTIN,
+    ReactionLibrary,
+    default_library,
+    load_library,
+)
+from dynresp.motion.sources.catalogue import load_licences, load_sources
+from dynresp.motion.sources.motion_folders import find_motion_file
+from dynresp.support.errors import (
+    MissingMotionDataError,
+    MotionFileError,
+    SpecError,
+    UnknownNameError,
+)
+from dynresp.support.paths import expanded
+
+BUILTIN_PREFIX = "builtin:"
+"""How the name of a built-in motion begins in an experiment file."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A motion that an experiment uses.
+
+    Attributes:
+        motion: Cut, mirrored and at the frame rate asked for.
+        about: Where it comes from, for `result.json`.
+        cut: The table that named it: of two, the one that could be had.
+    """
+
+    motion: Motion
+    about: dict[str, Any]
+    cut: MotionCut
+
+
+def take_motion(
+    cut: MotionCut,
+    otherwise: MotionCut | None,
+    key: str,
+    folders: Sequence[Path],
+    beside: Path,
+    fps: float,
+    character: Character,
+) -> Taken:
+    """Load the motion that a table names, or else the one it names for want of the first.
+
+    Args:
+        cut: The table.
+        otherwise: What to take where no motions folder holds that file.
+        key: Where the table stands in the file, for messages.
+        folders: Motions folders.
+        beside: Folder of the experiment file, from which relative paths count first.
+        fps: Frame rate to bring it to [1/s].
+        character: The character.
+
+    Raises:
+        MissingMotionDataError: Neither is on this machine.
+        SpecError: The cut does not fit the motion.
+        DynrespError: A file cannot be read.
+    """
+    found = find_motion(cut.motion, folders, beside)
+    if found is None and otherwise is not None:
+        taken = take_motion(otherwise, None, f"{key}.or", folders, beside, fps, character)
+        return replace(taken, about={**taken.about, "instead_of": cut.motion})
+    if found is None:
+        looked = ", ".join(str(folder) for folder in [beside, *folders])
+        raise MissingMotionDataError(
+            f"{key}.motion: {cut.motion!r} is not on this machine (looked in {looked}). "
+            "Name a folder that holds it with --motions or DYNRESP_MOTIONS, fetch it with "
+            f'`dynresp motions fetch core`, or write or = "{BUILTIN_PREFIX}walk" beside it.'
+        )
+    motion = load_cut(cut, found, key, character).resampled(fps)
+    return Taken(motion, about_cut(cut, found), cut)
+
+
+def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str | None:
+    """Find what a motion's name stands for.
+
+    Args:
+        name: "builtin:walk" and the like, a file, or a path inside a motions folder.
+        folders: Motions folders.
+        beside: Folder from which a relative path counts first.
+
+    Returns:
+        The file, the name of a built-in motion, or None where no motions folder holds it.
+
+    Raises:
+        MotionFileError: It can only be a file, and there is none.
+        SpecError: The path leads out of the motions folders.
+        UsageError: It begins with the home folder of nobody.
+    """
+    if name.startswith(BUILTIN_PREFIX):
+        return name.removeprefix(BUILTIN_PREFIX)
+    given = expanded(name, "motion")
+    own = beside / given
+    # os.path.isfile answers False where Path.is_file raises, as for a name that is too long.
+    if os.path.isfile(own):
+        return own
+    if given.is_absolute() or ".." in given.parts:
+        raise MotionFileError(f"{name}: no such file; expected a motion file")
+    return find_motion_file(given.as_posix(), folders)
+
+
+def load_cut(cut: MotionCut, found: Path | str, key: str, character: Character) -> Motion:
+    """Load a motion, and cut and mirror it as its table says.
+
+    Args:
+        cut: The table.
+        found: What `find_motion` found.
+        key: Where the table stands in the file, for messages.
+        character: The character.
+
+    Returns:
+        The motion at its own frame rate.
+
+    Raises:
+        SpecError: The cut does not fit the motion.
+        DynrespError: The file cannot be read.
+    """
+    motion = _load(cut, found, character)
+    stop_s = motion.duration if cut.stop_s is None else cut.stop_s
+    if cut.start_s >= motion.duration or stop_s > motion.duration + 0.5 / motion.fps:
+        asked = "start_s" if cut.start_s >= motion.duration else "stop_s"
+        raise SpecError(
+            f"{key}.{asked}: expected at most {motion.duration:.2f} s, which is how long "
+            f"{cut.motion!r} lasts{' without its T-poses' if cut.trim_t_pose else ''}, "
+            f"got {getattr(cut, asked):g}"
+        )
+    first, last = round(cut.start_s * motion.fps), round(stop_s * motion.fps)
+    part = motion.slice(first, min(last + 1, len(motion)))
+    return part.mirrored(character) if cut.mirrored else part
+
+
+def _load(cut: MotionCut, found: Path | str, character: Character) -> Motion:
+    if isinstance(found, str):
+        return load_builtin(found, character)
+    options = LoadOptions(
+        unit=cut.unit_m,
+        up=cut.up,
+        fps=cut.fps,
+        asf=None if cut.asf is None else found.parent / expanded(cut.asf, "asf"),
+        flat_floor=not cut.uneven_floor,
+        trim_t_poses=cut.trim_t_pose,
+    )
+    return load_motion(found, character, options)
+
+
+def about_cut(cut: MotionCut, found: Path | str) -> dict[str, Any]:
+    """Where a motion comes from, for `result.json`, without saying where on this machine.
+
+    Args:
+        cut: The table that names it.
+        found: What `find_motion` found.
+    """
+    told = cut.model_dump(exclude_defaults=True, by_alias=True, exclude={"otherwise", "hit_s"})
+    if isinstance(found, str):
+        return {**told, "built_in": True}
+    about: dict[str, Any] = {
+        **told,
+        "built_in": False,
+        "sha256": hashlib.sha256(found.read_bytes()).hexdigest(),
+    }
+    source = load_sources().get(cut.motion)
+    if source is not None and source.sha256 == about["sha256"]:
+        about["credit"] = load_licences()[source.source_repo].credit
+        about["licence"] = source.licence
+    return about
+
+
+def take_library(
+    which: str, folders: Sequence[Path], beside: Path, fps: float, character: Character
+) -> ReactionLibrary:
+    """Load the reactions that an experiment chooses from.
+
+    Args:
+        which: "core", "full", "builtin", or a library file (.toml). For want of the motion capture
+            of "core" it is the built-in library.
+        folders: Motions folders.
+        beside: Folder of the experiment file, from which a relative path counts.
+        fps: Frame rate of the reactions [1/s].
+        character: The character.
+
+    Raises:
+        UnknownNameError: There is no such library.
+        MissingMotionDataError: Its motion files are not on this machine.
+        SpecError: The library file is wrong.
+    """
+    if which == "core":
+        return default_library(folders, character, fps)
+    if which in ("full", BUILTIN):
+        return load_library(which, folders, character, fps)
+    if not which.endswith(".toml"):
+        names = ("core", "full", BUILTIN, "a library file (.toml)")
+        raise UnknownNameError("library", which, names)
+    return load_library(beside / expanded(which, "library"), folders, character, fps)
+
+
+def about_library(library: ReactionLibrary, which: str) -> dict[str, Any]:
+    """What `result.json` says of the library."""
+    about: dict[str, Any] = {
+        "name": library.name,
+        "identity": library.identity,
+        "reactions": len(library.reactions),
+        "built_in": all(reaction.builtin for reaction in library.reactions),
+    }
+    if which == "core" and library.name == BUILTIN:
+        about["instead_of"] = which
+    return about

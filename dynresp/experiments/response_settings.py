@@ -1,0 +1,68 @@
+"""From `[settings]` of an experiment file to the settings of physics, search and blend."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+from dynresp.experiments.experiment_spec import SettingsTable
+from dynresp.response.response import ResponseConfig
+from dynresp.support.errors import SpecError, UsageError
+
+# Where each key goes: the part of `ResponseConfig`, "" for the whole, and the name there.
+_PLACES = {
+    "blend_s": ("transition", "blend_s"),
+    "second_pass": ("transition", "second_pass"),
+    "window_s": ("window", "window_s"),
+    "exit_min_s": ("window", "exit_min_s"),
+    "exit_max_s": ("window", "exit_max_s"),
+    "entry_step_s": ("window", "entry_step_s"),
+    "entry_max_s": ("", "entry_max_s"),
+    "remaining_s": ("", "remaining_s"),
+    "graze_speed_m_s": ("", "graze_speed"),
+    "carry_on_max_error_m": ("", "carry_on_max_error"),
+    "carry_on_s": ("", "carry_on_s"),
+    "substeps": ("physics", "substeps"),
+}
+
+
+def response_config(settings: SettingsTable) -> ResponseConfig:
+    """Settings of an experiment over the defaults.
+
+    Raises:
+        SpecError: They contradict each other.
+    """
+    config = ResponseConfig()
+    given = settings.model_dump(exclude_none=True)
+    try:
+        for part in ("transition", "window", "physics"):
+            own = {_PLACES[k][1]: v for k, v in given.items() if _PLACES[k][0] == part}
+            config = replace(config, **{part: replace(getattr(config, part), **own)})
+        own = {_PLACES[k][1]: v for k, v in given.items() if not _PLACES[k][0]}
+        return replace(config, **own)
+    except UsageError as error:
+        raise SpecError(f"settings.{error}") from None
+
+
+def in_force(config: ResponseConfig) -> dict[str, Any]:
+    """What `result.json` says of the settings: every key of `[settings]`, given or not.
+
+    Under `fixed` stands what an experiment file cannot set.
+    """
+    told = {}
+    for key, (part, name) in _PLACES.items():
+        told[key] = getattr(getattr(config, part) if part else config, name)
+    servo = {item.name: getattr(config.physics.servo, item.name)
+             for item in fields(config.physics.servo)}  # fmt: skip
+    return {
+        **told,
+        "fixed": {
+            "fps": config.physics.fps,
+            "carry_on_exit_s": config.carry_on_exit_s,
+            "carry_on_slack_s": config.carry_on_slack_s,
+            "position_weight": config.window.position_weight,
+            "angle_weight_m": config.window.angle_weight,
+            "servo": {k: dict(v) if isinstance(v, Mapping) else v for k, v in servo.items()},
+        },
+    }

@@ -1,1 +1,0 @@
-"""Motion graphs from files to folders: plans, building, and outings written for people to see."""

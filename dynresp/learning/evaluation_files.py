@@ -1,0 +1,99 @@
+"""The folder of an evaluation: `evaluation.json`, `per_strategy.csv` and `confusion.png`."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dynresp.results.result_json import write_json
+from dynresp.support.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+EVALUATION, TABLE, PICTURE = "evaluation.json", "per_strategy.csv", "confusion.png"
+
+_DPI = 150
+_INK = "#23272e"
+# More classes are drawn without their names and numbers, which nobody could read.
+_MOST_NAMED, _MOST_NUMBERED = 80, 40
+
+
+def write_report(folder: Path, content: dict[str, Any]) -> list[str]:
+    """Write an evaluation.
+
+    Args:
+        folder: Where to; made if it is missing.
+        content: What `evaluate` gives.
+
+    Returns:
+        Names of the files.
+
+    Raises:
+        DynrespError: A file cannot be written.
+    """
+    write_json(content, folder / EVALUATION)
+    _write_table(folder / TABLE, content["per_strategy"])
+    write_confusion(folder / PICTURE, content)
+    return [EVALUATION, TABLE, PICTURE]
+
+
+def _write_table(path: Path, per_strategy: dict[str, dict[str, Any]]) -> None:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        figures = next(iter(per_strategy.values()))
+        writer = csv.DictWriter(file, ["strategy", *figures], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({"strategy": name, **row} for name, row in per_strategy.items())
+
+
+def write_confusion(path: Path, content: dict[str, Any]) -> None:
+    """Write the confusion matrix as a PNG; classes that nobody chose are left out.
+
+    Args:
+        path: The file; missing folders are made.
+        content: What `evaluate` gives.
+
+    Raises:
+        DynrespError: The file cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    counts = np.array(content["confusion"]["counts"])
+    seen = np.flatnonzero(counts.sum(axis=0) + counts.sum(axis=1))
+    counts = counts[np.ix_(seen, seen)]
+    names = [content["confusion"]["classes"][i].replace("_", " ") for i in seen]
+    rows = [f"{name} ({n})" for name, n in zip(names, counts.sum(axis=1), strict=True)]
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    size = 3.2 + 0.3 * min(len(seen), _MOST_NUMBERED)
+    figure = Figure((size + 0.8, size), dpi=_DPI, facecolor="white", layout="constrained")
+    axes = figure.add_subplot()
+    image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=1.0)
+    if len(seen) <= _MOST_NAMED:
+        axes.set_xticks(range(len(seen)), names, rotation=90, fontsize=7, parse_math=False)
+        axes.set_yticks(range(len(seen)), rows, fontsize=7, parse_math=False)
+    if len(seen) <= _MOST_NUMBERED:
+        _number(axes, shares)
+    axes.set_xlabel("chosen with the classifier, in use", fontsize=8.5)
+    axes.set_ylabel("chosen by the oracle (how often)", fontsize=8.5)
+    bar = figure.colorbar(image, ax=axes, shrink=0.7, pad=0.02)
+    bar.set_label("share of the oracle's", fontsize=8.5)
+    bar.ax.tick_params(labelsize=8)
+    figure.suptitle(
+        f"{content['accuracy']:.1%} of {content['samples']} samples as the oracle chose",
+        x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK,
+    )  # fmt: skip
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _number(axes: Axes, shares: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+    """Per cent in every cell that rounds to at least one."""
+    for row, column in zip(*np.nonzero(shares >= 0.005), strict=True):
+        share = shares[row, column]
+        axes.text(
+            column, row, f"{100 * share:.0f}", ha="center", va="center", fontsize=6,
+            color="white" if share > 0.55 else _INK,
+        )  # fmt: skip

@@ -1,0 +1,102 @@
+"""Avatars that walk by one graph, advanced together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy.typing as npt
+
+from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Planner
+from dynresp.locomotion.avatar.graph_entry import ReentryPlanner
+from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.random_walk import check_in_component
+from dynresp.motion.character import Character
+from dynresp.motion.motion import Motion
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
+from dynresp.motion.rotations import FloatArray
+from dynresp.response.choice import Chooser
+from dynresp.response.response import ResponseConfig
+from dynresp.response.runtime.crowd import Crowd
+from dynresp.support.errors import UsageError
+
+
+class AvatarCrowd:
+    """Avatars that walk by one graph and are advanced together; their hits share batches.
+
+    Attributes:
+        graph: Where they walk.
+        avatars: The avatars.
+        crowd: Their run-time side.
+    """
+
+    def __init__(
+        self,
+        character: Character,
+        library: ReactionLibrary,
+        graph: MotionGraph,
+        planners: Sequence[Planner],
+        starts: Sequence[tuple[int, npt.ArrayLike]],
+        config: AvatarConfig | None = None,
+        response: ResponseConfig | None = None,
+        chooser: Chooser | None = None,
+        threads: int = 0,
+        reentry: ReentryPlanner | None = None,
+    ) -> None:
+        """Make ready.
+
+        Args:
+            character: The body of all of them.
+            library: Its reactions, at the simulation's frame rate.
+            graph: Where they walk, of the same character; its frame rate is at most that of the
+                simulation.
+            planners: What says where each goes.
+            starts: For each a frame of the graph, and where its clip is put (4,); see
+                `dynresp.locomotion.graph.placement`.
+            config: Settings of the avatars.
+            response: Settings of their responders.
+            chooser: What chooses reactions; None for the oracle.
+            threads: Threads for the physics, 0 for all cores.
+            reentry: Finds the way back, for several crowds of one graph; None for one of its own.
+
+        Raises:
+            UsageError: The graph is another character's or too fast, a start is not in it, or there
+                are not as many planners as starts.
+            MotionError: There is no avatar, or the library has another frame rate.
+        """
+        settings = response or ResponseConfig()
+        fps = settings.physics.fps
+        if graph.database.character != character.identity:
+            raise UsageError("the graph was made of another character's motions; build it anew")
+        if graph.database.fps > fps:
+            raise UsageError(
+                f"the graph has {graph.database.fps:g} fps, the simulation {fps:g}; build the "
+                "graph with as many or fewer"
+            )
+        if len(planners) != len(starts):
+            raise UsageError(f"{len(starts)} starts and {len(planners)} planners were given")
+        for frame, _ in starts:
+            check_in_component(graph, frame)
+        self.graph = graph
+        bases = [
+            Motion(placement.place_poses(graph.database.poses[f : f + 1], place), fps, "start")
+            for f, place in starts
+        ]
+        self.crowd = Crowd(character, library, bases, settings, chooser, threads)
+        reentry = reentry or ReentryPlanner(graph, character)
+        self.avatars = tuple(
+            Avatar(character, responder, planner, reentry, frame, config or AvatarConfig())
+            for responder, planner, (frame, _) in zip(
+                self.crowd.responders, planners, starts, strict=True
+            )
+        )
+
+    def advance(self) -> FloatArray:
+        """Go on by one frame.
+
+        Returns:
+            (avatars, 59) what they show.
+        """
+        for avatar in self.avatars:
+            avatar.keep_on()
+        return self.crowd.advance()

@@ -1,0 +1,259 @@
+"""Which frame of a graph resembles a pose most.
+
+The distance is the graph's own (eq. 2 and 3). Of the pairs of a pose and a frame only few are
+computed in full: a sketch of each, whose squared distance is never above the distance, tells which.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.locomotion.graph.frame_distance import (
+    JOINT_WEIGHTS,
+    FrameFeatures,
+    frame_distances,
+    frame_features,
+)
+from dynresp.locomotion.graph.graph_config import Coordinates
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import IntArray
+from dynresp.support.errors import MotionError
+
+# Bits of the feet in a contact state.
+_FEET = 3
+# Numbers of a sketch, besides the length of what it leaves out.
+_SKETCH = 32
+# What single precision may add to the squared distance of two sketches.
+_SLACK = 1e-3
+# Of the joints that are compared, the arms', and the others.
+_COMPARED = [name for name, weight in JOINT_WEIGHTS.items() if weight]
+_FREE = [i for i, name in enumerate(_COMPARED) if name.endswith(("shoulder", "elbow"))]
+_STEADY = [i for i in range(len(_COMPARED)) if i not in _FREE]
+# Moments that are looked up at once.
+_BLOCK = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """What of a graph resembles each of some poses most.
+
+    Attributes:
+        frames: (m,) of the graph's database; of `EntryIndex.several` (m, count), as the others.
+        distances: (m,) how unlike they are (eq. 2).
+        same_contacts: (m,) whether the same feet stand.
+    """
+
+    frames: IntArray
+    distances: FloatArray
+    same_contacts: npt.NDArray[np.bool_]
+
+
+class EntryIndex:
+    """Frames of a graph laid out for looking up what resembles a pose.
+
+    Attributes:
+        graph: Whose frames.
+        frames: (k,) which of them may be entered, ascending.
+    """
+
+    def __init__(self, graph: MotionGraph, frames: npt.ArrayLike | None = None) -> None:
+        """Lay frames out.
+
+        Args:
+            graph: Whose frames.
+            frames: Which may be entered, by default all of the graph's component.
+
+        Raises:
+            MotionError: There is none.
+        """
+        self.graph = graph
+        self.frames: IntArray = np.array(graph.frames if frames is None else frames, np.int32)
+        if not len(self.frames):
+            raise MotionError("an index of entries needs at least one frame; none was given")
+        database = graph.database
+        self._features = frame_features(
+            database.poses[self.frames], database.velocities[self.frames], graph.config
+        )
+        rows = _rows(self._features)
+        self._center = rows.mean(axis=0)
+        rows -= self._center
+        # The directions in which the frames differ most; an orthogonal projection brings nothing
+        # farther apart.
+        _, vectors = np.linalg.eigh(rows.T @ rows)
+        self._axes = vectors[:, ::-1][:, :_SKETCH].copy()
+        sketch = self._sketched(rows)
+        feet = database.contact_states[self.frames] & _FEET
+        # The frames in which the same feet stand, for each state; then all.
+        self._places = [np.flatnonzero(feet == state) for state in range(_FEET + 1)]
+        self._places.append(np.arange(len(self.frames)))
+        self._sketches = [sketch[places].T.copy() for places in self._places]
+
+    def nearest(
+        self,
+        poses: FloatArray,
+        velocities: FloatArray,
+        contacts: npt.NDArray[np.bool_],
+        farthest: float = np.inf,
+    ) -> Nearest:
+        """The frame that resembles each pose most, of those in which the same feet stand.
+
+        Where none of those is near enough, of all.
+
+        Args:
+            poses: (m, 59).
+            velocities: (m, 45) rows of `qvel`.
+            contacts: (m, 2) whether the left and the right foot stand.
+            farthest: What is not nearer than this is not near enough; and where nothing is, it need
+                not be the nearest that is told.
+        """
+        features, sketch, standing = self._laid_out(poses, velocities, contacts)
+        places, distances = np.zeros(len(sketch), np.intp), np.full(len(sketch), np.inf)
+
+        def look_up(rows: npt.NDArray[np.intp], state: int) -> None:
+            if len(rows) and len(self._places[state]):
+                for block in np.array_split(rows, -(-len(rows) // _BLOCK)):
+                    found = self._look_up(features, sketch, block, state, farthest)
+                    places[block], distances[block] = found
+
+        for state in range(_FEET + 1):
+            look_up(np.flatnonzero(standing == state), state)
+        same = np.isfinite(distances) & (distances <= farthest)
+        look_up(np.flatnonzero(~same), _FEET + 1)
+        return Nearest(self.frames[places], distances, same)
+
+    def several(
+        self,
+        poses: FloatArray,
+        velocities: FloatArray,
+        contacts: npt.NDArray[np.bool_],
+        count: int,
+        farthest: float = np.inf,
+    ) -> Nearest:
+        """Some frames that resemble each pose: the nearest, and others that hardly do less.
+
+        The others are those whose sketches are nearest, which need not be the next in order.
+
+        Args:
+            poses: (m, 59).
+            velocities: (m, 45) rows of `qvel`.
+            contacts: (m, 2) whether the left and the right foot stand.
+            count: How many for each, 1 or more; where there are fewer, the nearest is repeated.
+            farthest: See `nearest`.
+
+        Returns:
+            (m, count) each; the nearest is the first.
+        """
+        best = self.nearest(poses, velocities, contacts, farthest)
+        features, sketch, standing = self._laid_out(poses, velocities, contacts)
+        standing = np.where(best.same_contacts, standing, _FEET + 1)
+        frames = np.repeat(best.frames[:, None], count, axis=1)
+        distances = np.repeat(best.distances[:, None], count, axis=1)
+        for state in range(_FEET + 2):
+            least = min(count, len(self._places[state]) + 1) - 1
+            rows = np.flatnonzero(standing == state)
+            if not len(rows) or not least:
+                continue
+            for block in np.array_split(rows, -(-len(rows) // _BLOCK)):
+                bounds = self._bounds(sketch[block], state)
+                columns = np.argpartition(bounds, least - 1, axis=1)[:, :least]
+                others = self._places[state][columns]
+                frames[block, 1 : least + 1] = self.frames[others]
+                distances[block, 1 : least + 1] = self._distances(
+                    features, np.repeat(block, least), others.ravel()
+                ).reshape(others.shape)
+        return Nearest(frames, distances, np.repeat(best.same_contacts[:, None], count, axis=1))
+
+    def _laid_out(
+        self, poses: FloatArray, velocities: FloatArray, contacts: npt.NDArray[np.bool_]
+    ) -> tuple[FrameFeatures, npt.NDArray[np.float32], npt.NDArray[np.intp]]:
+        """Poses as they are compared: in full, as sketches, and which feet stand (bits)."""
+        features = frame_features(poses, velocities, self.graph.config)
+        sketch = self._sketched(_rows(features) - self._center)
+        return features, sketch, np.asarray(contacts, dtype=np.intp) @ np.array([1, 2])
+
+    def _bounds(self, own: npt.NDArray[np.float32], state: int) -> npt.NDArray[np.float32]:
+        """No more than the squared distances between some sketches and a state's (rows, k)."""
+        others = self._sketches[state]
+        least = np.sum(others**2, axis=0) - 2.0 * (own @ others)
+        least += (np.sum(own**2, axis=1) - np.float32(_SLACK))[:, None]
+        bounds: npt.NDArray[np.float32] = least
+        return bounds
+
+    def _look_up(
+        self,
+        features: FrameFeatures,
+        sketch: npt.NDArray[np.float32],
+        rows: npt.NDArray[np.intp],
+        state: int,
+        farthest: float,
+    ) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """Place and distance of what is nearest to some poses, of the frames of a state."""
+        least = self._bounds(sketch[rows], state)
+        first = least.argmin(axis=1)
+        bound = self._distances(features, rows, self._places[state][first])
+        close = least <= np.minimum(bound, farthest)[:, None]
+        close[np.arange(len(rows)), first] = True
+        moment, column = np.nonzero(close)
+        found = self._distances(features, rows[moment], self._places[state][column])
+        # Of each pose the least one, the first of those that are alike.
+        order = np.lexsort((column, found, moment))
+        best = order[np.searchsorted(moment[order], np.arange(len(rows)))]
+        return self._places[state][column[best]], found[best]
+
+    def _distances(
+        self,
+        features: FrameFeatures,
+        moments: npt.NDArray[np.intp],
+        places: npt.NDArray[np.intp],
+    ) -> FloatArray:
+        """(k,) distances between poses and frames, pair by pair."""
+        own = np.arange(len(moments))
+        both = _paired(features, moments, self._features, places)
+        return frame_distances(both, own, own + len(moments))
+
+    def _sketched(self, rows: FloatArray) -> npt.NDArray[np.float32]:
+        """Centred rows along the axes, and the length of the rest (n, sketch + 1)."""
+        along = rows @ self._axes
+        rest = np.sum(rows**2, axis=1) - np.sum(along**2, axis=1)
+        return np.column_stack([along, np.sqrt(np.maximum(rest, 0.0))]).astype(np.float32)
+
+
+def _paired(
+    a: FrameFeatures, rows: npt.NDArray[np.intp], b: FrameFeatures, others: npt.NDArray[np.intp]
+) -> FrameFeatures:
+    """Rows of one, then rows of another."""
+    return FrameFeatures(
+        a.config,
+        np.concatenate([a.positions[rows], b.positions[others]]),
+        np.concatenate([a.orientations[rows], b.orientations[others]]),
+        np.concatenate([a.yaws[rows], b.yaws[others]]),
+        np.concatenate([a.joints[rows], b.joints[others]]),
+        np.concatenate([a.linear[rows], b.linear[others]]),
+        np.concatenate([a.rates[rows], b.rates[others]]),
+    )
+
+
+def _rows(features: FrameFeatures) -> FloatArray:
+    """(n, d) numbers whose squared differences add up to no more than the distance.
+
+    The chord between two quaternions is not longer than half the angle between the rotations, if
+    the signs are right. Those of legs and trunk, which never turn half around, are right where w is
+    not negative. Of pelvis and arms the product of the quaternion with itself is taken, which has
+    no sign: two of them are apart by the sine of half the angle.
+    """
+    n = len(features)
+    steady = features.joints[:, _STEADY]
+    signed = np.where(steady[..., :1] < 0.0, -steady, steady)
+    free = features.joints[:, _FREE]
+    columns = [features.rates, signed.reshape(n, -1)]
+    if features.config.coordinates is not Coordinates.BLOCKS:
+        free = np.concatenate([features.orientations[:, None], free], axis=1)
+        columns += [features.positions, features.linear]
+    i, j = np.triu_indices(4)
+    scale = np.where(i == j, np.sqrt(0.5), 1.0)
+    columns.append((scale * free[..., i] * free[..., j]).reshape(n, -1))
+    return np.concatenate(columns, axis=1)

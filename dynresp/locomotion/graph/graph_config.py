@@ -1,0 +1,140 @@
+"""Settings of a motion graph."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from numbers import Real
+
+from dynresp.support.errors import UsageError
+
+
+class Coordinates(Enum):
+    """In what world frames are compared (Lee et al. 2002, section 4.1.2)."""
+
+    RELATIVE = "relative"
+    """Anywhere on level ground, facing anywhere: position on the ground and yaw do not count."""
+    FIXED = "fixed"
+    """In the world of the recording, where things stand in their places."""
+    BLOCKS = "blocks"
+    """On a grid of blocks: whole blocks along and up, and quarter turns, do not count."""
+
+
+# Rates [1/s] and times of blending [s] outside of these make no motion; the rest must be finite.
+_RANGES = {"fps": (1.0, 240.0), "blend_s": (0.01, 10.0), "blend_rate_s": (0.01, 10.0)}
+_GREATEST = sys.float_info.max
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+# What the fields may hold, by the type they are declared with, and what it is called.
+_KINDS: dict[str, tuple[Callable[[object], bool], str]] = {
+    "float": (_is_number, "a number"),
+    "bool": (lambda value: isinstance(value, bool), "True or False"),
+    "bool | None": (lambda value: value is None or isinstance(value, bool), "True, False or None"),
+    "Coordinates": (
+        lambda value: isinstance(value, Coordinates),
+        "one of " + ", ".join(str(one) for one in Coordinates),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class GraphConfig:
+    """How a motion graph is made.
+
+    Attributes:
+        fps: Frame rate of its frames, 1 to 240 [1/s]; the paper's is 15.
+        mirrored: Whether the mirror image of every motion belongs to it.
+        coordinates: In what world frames are compared.
+        contact_change: Whether jumps are allowed only where a contact begins or ends, the strict
+            form of the first pruning rule.
+        sigma: Distance at which the probability has fallen to 1/e (eq. 1).
+        least_probability: Jumps with exp(-D / sigma) below it are dropped, the second rule.
+        velocity_weight: Weight of squared velocity differences [s^2], the nu of eq. 2: the square
+            of the time, here 0.15 s, in which a difference in velocity counts as much as the
+            difference in pose that it leads to. Angles and their rates are halved, as in eq. 3.
+        local_maxima: Whether of neighbouring jumps only the best stays, the third rule. None
+            does what the paper does: not where contact_change already leaves single ones.
+        stutter_s: Jumps within a clip that skip or repeat less than this are none [s].
+        slip_m: A jump is dropped if a foot stands from its first frame to the blend's end (the
+            paper's case 4), and would be farther than this from where it was before the jump [m].
+        blend_s: Time over which a jump is blended, 0.01 to 10 [s]; 1 to 2 in the paper.
+        blend_rate_s: Time over which the difference in velocity at a jump goes, at most blend_s
+            [s]. The paper has one time for both; but a joint that is 3 rad/s faster when it is
+            left would go on to swing 25 degrees too far in a blend of 1 s, and a third of it in
+            0.3 s. The root takes twice this time.
+        block_m: Side of a block [m], of `Coordinates.BLOCKS`.
+        block_height_m: Its height [m].
+    """
+
+    fps: float = 15.0
+    mirrored: bool = False
+    coordinates: Coordinates = Coordinates.RELATIVE
+    contact_change: bool = True
+    sigma: float = 0.05
+    least_probability: float = 0.02
+    velocity_weight: float = 0.0225
+    local_maxima: bool | None = None
+    stutter_s: float = 0.25
+    slip_m: float = 0.03
+    blend_s: float = 1.0
+    blend_rate_s: float = 0.3
+    block_m: float = 0.6096
+    block_height_m: float = 0.1905
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            UsageError: One of them makes no sense, or is of another type.
+        """
+        for field in dataclasses.fields(self):
+            right, expected = _KINDS[str(field.type)]
+            value = getattr(self, field.name)
+            if not right(value):
+                raise UsageError(f"{field.name} must be {expected}, got {value!r:.60}")
+        # Compared, not asked whether they are finite: that fails on whole numbers beyond a float.
+        for name, (least, most) in _RANGES.items():
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise UsageError(
+                    f"{name} must be from {least:g} to {most:g}, got {str(value)[:40]}"
+                )
+        for name in ("sigma", "block_m", "block_height_m"):
+            value = getattr(self, name)
+            if not 0 < value <= _GREATEST:
+                raise UsageError(f"{name} must be above 0 and finite, got {str(value)[:40]}")
+        for name in ("velocity_weight", "stutter_s", "slip_m"):
+            value = getattr(self, name)
+            if not 0 <= value <= _GREATEST:
+                raise UsageError(f"{name} must be 0 or more and finite, got {str(value)[:40]}")
+        if not 0 < self.least_probability < 1:
+            raise UsageError(
+                f"least_probability must be between 0 and 1, got {str(self.least_probability)[:40]}"
+            )
+        if self.blend_rate_s > self.blend_s:
+            raise UsageError(
+                f"blend_rate_s must be at most blend_s, {self.blend_s:g}, got {self.blend_rate_s:g}"
+            )
+        if self.mirrored and self.coordinates is Coordinates.FIXED:
+            raise UsageError(
+                "mirrored motion in fixed coordinates would stand in a mirrored world; "
+                "use relative coordinates, or leave mirrored out"
+            )
+
+    @property
+    def keeps_local_maxima(self) -> bool:
+        """Whether the third rule is in force."""
+        return not self.contact_change if self.local_maxima is None else self.local_maxima
+
+    @property
+    def farthest(self) -> float:
+        """Largest distance of a jump that the second rule keeps."""
+        return -self.sigma * math.log(self.least_probability)

@@ -1,0 +1,38 @@
+"""The compiled inner loop of random walks.
+
+Importing this module compiles it or loads it from numba's cache; import it where it is used.
+"""
+
+from __future__ import annotations
+
+from numba import types
+
+from dynresp.support.compiling import compiled
+
+_OFFSETS = types.Array(types.int64, 1, "C", readonly=True)
+_TARGETS = types.Array(types.int32, 1, "C", readonly=True)
+_FLOATS = types.Array(types.float64, 1, "C", readonly=True)
+_SIGNATURE = types.void(_OFFSETS, _TARGETS, _FLOATS, _FLOATS, types.int32[::1])
+
+
+@compiled(_SIGNATURE)
+def walk_kernel(offsets, targets, cumulative, chances, path):  # type: ignore[no-untyped-def]
+    """Write a walk.
+
+    Args:
+        offsets: (n + 1,) where the rows of ways begin.
+        targets: (m,) where the ways lead.
+        cumulative: (m,) sums of probabilities along each row, the last of which is 1.
+        chances: (k,) numbers in [0, 1).
+        path: (k + 1,) its first frame is given; the others are written.
+    """
+    for k in range(len(chances)):
+        low, high = offsets[path[k]], offsets[path[k] + 1] - 1
+        # The first way whose sum is above the number.
+        while low < high:
+            middle = (low + high) // 2
+            if chances[k] < cumulative[middle]:
+                high = middle
+            else:
+                low = middle + 1
+        path[k + 1] = targets[low]

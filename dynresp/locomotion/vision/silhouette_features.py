@@ -1,0 +1,169 @@
+"""What is measured of a silhouette: its shape, and where its centre is (Lee et al. 2002, 5.3).
+
+The paper describes a shape by the seven Hu moments. They do not change when a shape is turned in
+the picture or, but for the sign of the seventh, mirrored, so that much of what tells a person's
+poses apart is lost. By default a shape is therefore told by a grid laid over it, as large as the
+silhouette is spread, so that like Hu's moments it depends neither on where a person is nor on how
+tall or how far away; what share of each cell is covered is then reduced to principal components.
+
+Of the centre its motion counts. Speeds are told in silhouette radii a second, the radius being the
+root mean square distance of a silhouette's points from its centre: about a quarter of the height
+of somebody standing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.locomotion.vision.silhouettes import Mask
+from dynresp.motion.rotations import FloatArray
+from dynresp.support.errors import UsageError
+
+# The grid: rows and columns, and how far it reaches from the centre in radii.
+_GRID = (12, 8)
+_REACH = (2.4, 1.6)
+# Hu's moments are products of up to so many moments; their roots are all of one kind of size.
+_DEGREES = np.array([1.0, 2.0, 2.0, 2.0, 4.0, 3.0, 4.0])
+
+
+class Shape(Enum):
+    """How the shape of a silhouette is told."""
+
+    GRID = "grid"
+    """Share of each cell of a grid that is covered."""
+    HU = "hu"
+    """The seven Hu moments, as in the paper."""
+
+
+@dataclass(frozen=True)
+class FeatureConfig:
+    """What is compared, and how much each part counts.
+
+    Attributes:
+        shape: How shapes are told.
+        components: Principal components of the grid.
+        span_s: Speeds are means over so long [s], up to now.
+        distance_m: Distance of the camera for which the apparent growth of somebody who comes
+            nearer is foreseen [m].
+        shape_weight: Of the squared distance of shapes.
+        speed_weight: Of the squared differences of the centre's speeds to the right and up.
+        growth_weight: Of the squared difference of growth.
+    """
+
+    shape: Shape = Shape.GRID
+    components: int = 30
+    span_s: float = 0.4
+    distance_m: float = 6.0
+    shape_weight: float = 2.0
+    speed_weight: float = 2.0
+    growth_weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            UsageError: One of them makes no sense.
+        """
+        if not 1 <= self.components <= _GRID[0] * _GRID[1]:
+            raise UsageError(
+                f"components must be 1 to {_GRID[0] * _GRID[1]}, got {self.components}"
+            )
+        for name in ("span_s", "distance_m"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+        for name in ("shape_weight", "speed_weight", "growth_weight"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class Measures:
+    """One silhouette.
+
+    Attributes:
+        shape: (96,) covered shares of the grid, row by row from the top left, or (7,) signed roots
+            of Hu's moments.
+        right: Where the centre is in the picture, to the right [pixels].
+        up: The same upwards, counted from the upper edge, so below 0 [pixels].
+        radius: Root mean square distance of the silhouette's points from the centre [pixels].
+    """
+
+    shape: FloatArray
+    right: float
+    up: float
+    radius: float
+
+
+def measure(mask: Mask, shape: Shape) -> Measures | None:
+    """Measure a silhouette.
+
+    Args:
+        mask: (height, width), not 0 inside.
+        shape: How to tell its shape.
+
+    Returns:
+        None where there is nothing inside.
+    """
+    import cv2
+
+    moments = cv2.moments(mask, binaryImage=True)
+    area = moments["m00"]
+    if area == 0.0:
+        return None
+    x, y = moments["m10"] / area, moments["m01"] / area
+    # A single pixel has a spread, too.
+    radius = max(((moments["mu20"] + moments["mu02"]) / area) ** 0.5, 0.4)
+    if shape is Shape.HU:
+        told = signed_roots(np.asarray(cv2.HuMoments(moments), dtype=np.float64)[:, 0])
+    else:
+        told = _grid(mask, x, y, radius)
+    return Measures(told, float(x), -float(y), float(radius))
+
+
+def signed_roots(hu: npt.NDArray[Any]) -> FloatArray:
+    """Hu's moments (..., 7), each with the root of its degree and its sign.
+
+    The moments span many powers of ten. Their logarithms are often taken, but where a moment
+    passes through 0, as four of them do whenever a shape is symmetric, they jump; roots do not.
+    """
+    return np.asarray(np.sign(hu) * np.abs(hu) ** (1.0 / _DEGREES), dtype=np.float64)
+
+
+def _grid(mask: Mask, x: float, y: float, radius: float) -> FloatArray:
+    """Covered shares (96,) of the cells of a grid about a point."""
+    import cv2
+
+    rows, columns = mask.shape
+    high, wide = _REACH[0] * radius, _REACH[1] * radius
+    top, bottom = round(y - high), round(y + high) + 1
+    left, right = round(x - wide), round(x + wide) + 1
+    cut = np.zeros((bottom - top, right - left), dtype=np.float32)
+    inside = mask[max(top, 0) : min(bottom, rows), max(left, 0) : min(right, columns)]
+    row, column = max(-top, 0), max(-left, 0)
+    cut[row : row + inside.shape[0], column : column + inside.shape[1]] = inside != 0
+    cells = cv2.resize(cut, _GRID[::-1], interpolation=cv2.INTER_AREA)
+    return np.asarray(cells, dtype=np.float64).ravel()
+
+
+def speeds(tracks: npt.NDArray[Any], span: int, fps: float) -> npt.NDArray[Any]:
+    """Mean speed over the last frames, from one row a frame.
+
+    Args:
+        tracks: (frames, ...) of one clip.
+        span: Over how many frames; fewer at the beginning, where the first frame takes the
+            second one's.
+        fps: Frames per second.
+
+    Returns:
+        As `tracks`, per second.
+    """
+    now = np.arange(len(tracks))
+    now[0] = min(1, len(tracks) - 1)
+    before = np.maximum(now - span, 0)
+    passed = np.maximum(now - before, 1) / fps
+    return (tracks[now] - tracks[before]) / passed.reshape(-1, *([1] * (tracks.ndim - 1)))

@@ -1,0 +1,123 @@
+"""Pictures from a file or a camera, within bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.support.errors import MotionFileError
+
+Picture = npt.NDArray[np.uint8]
+
+MAX_SIDE = 8192
+"""Most pixels along a side of a picture."""
+MAX_FRAMES = 1_000_000
+"""Most pictures of one video: nine hours at 30 a second."""
+# What files and cameras say of their rate is taken within these bounds.
+_FPS_RANGE = (1.0, 1000.0)
+_USUAL_FPS = 30.0
+
+
+class Video:
+    """An open video; use it in a `with` block.
+
+    Attributes:
+        name: What was opened, for people.
+        fps: Pictures per second, as the file or camera says; 30 of a camera that does not say.
+        length: Pictures it holds, as the file says; None of a camera, and where it does not say.
+    """
+
+    def __init__(self, source: Path | str | int) -> None:
+        """Open a file, or a camera by its number (0 is the first).
+
+        Raises:
+            MotionFileError: It cannot be opened, is no video, its name is not UTF-8, or its
+                pictures are too large.
+        """
+        import cv2
+
+        is_camera = isinstance(source, int)
+        self.name = f"camera {source}" if is_camera else str(source)
+        if not is_camera and not Path(self.name).is_file():
+            what = "is a folder" if Path(self.name).is_dir() else "no such file"
+            raise MotionFileError(
+                f"{self.name}: {what}; give a video file, or a camera (such as camera:0)"
+            )
+        # OpenCV crashes on a name that Python cannot encode.
+        try:
+            self.name.encode()
+        except UnicodeEncodeError:
+            said = self.name.encode(errors="backslashreplace").decode()
+            raise MotionFileError(f"{said}: the name is not UTF-8; rename the file") from None
+        # OpenCV warns on standard error of what it cannot read; the errors below say it.
+        level = cv2.utils.logging.getLogLevel()
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        try:
+            self._capture: Any = cv2.VideoCapture(source if isinstance(source, int) else self.name)
+        finally:
+            cv2.utils.logging.setLogLevel(level)
+        if not self._capture.isOpened():
+            self._capture.release()
+            help_text = (
+                "look whether it is plugged in and not in use"
+                if is_camera
+                else "expected a video that OpenCV reads, such as MP4 (H.264), AVI (MJPG) or WebM"
+            )
+            raise MotionFileError(f"{self.name}: cannot be opened; {help_text}")
+        width, height = (
+            int(self._capture.get(which))
+            for which in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        )
+        if max(width, height) > MAX_SIDE:
+            self._capture.release()
+            raise MotionFileError(
+                f"{self.name}: pictures of {width} x {height} pixels; at most {MAX_SIDE} along a "
+                "side are read, make them smaller"
+            )
+        length = float(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        self.length = int(length) if not is_camera and 1.0 <= length <= MAX_FRAMES else None
+        told = float(self._capture.get(cv2.CAP_PROP_FPS))
+        low, high = _FPS_RANGE
+        if math.isfinite(told) and low <= told <= high:
+            self.fps = told
+        elif is_camera:
+            self.fps = _USUAL_FPS
+        else:
+            self._capture.release()
+            raise MotionFileError(
+                f"{self.name}: says that it has {told:g} pictures a second; expected {low:g} to "
+                f"{high:g}"
+            )
+
+    def __enter__(self) -> Video:
+        """The video itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self._capture.release()
+
+    def __iter__(self) -> Iterator[Picture]:
+        """The pictures (height, width, 3), blue green red, as bytes.
+
+        Raises:
+            MotionFileError: There is none at all, one is too large, or there are too many.
+        """
+        for count in range(MAX_FRAMES):
+            there, picture = self._capture.read()
+            if not there:
+                if count == 0:
+                    raise MotionFileError(f"{self.name}: holds no picture that can be read")
+                return
+            if max(picture.shape[:2]) > MAX_SIDE:
+                raise MotionFileError(
+                    f"{self.name}: picture {count} has {picture.shape[1]} x {picture.shape[0]} "
+                    f"pixels; at most {MAX_SIDE} along a side are read"
+                )
+            yield np.asarray(picture, dtype=np.uint8)
+        raise MotionFileError(f"{self.name}: has more than {MAX_FRAMES:,} pictures; cut it")

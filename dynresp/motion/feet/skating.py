@@ -1,0 +1,58 @@
+"""How far standing feet slide over the ground.
+
+A foot stands on the corners of its sole that touch, and on all that lies between them. From one
+frame to the next it slides by the way of that one of these points that moves least. A foot that
+rolls over its heel or its ball does not slide, and one that pivots on its sole does not, either:
+the point about which it turns stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynresp.motion import rotations
+from dynresp.motion.character import BodyStates, Character
+from dynresp.motion.ground import sole_points
+from dynresp.motion.motion import FEET, Motion
+from dynresp.motion.rotations import FloatArray
+
+TOUCH = 0.005
+"""A corner touches that is at most this much higher than the sole's lowest [m]: a shoe gives, and
+so does the measurement."""
+
+
+def foot_slides(character: Character, states: BodyStates) -> FloatArray:
+    """The way that each foot slides from each frame to the next, if it stands.
+
+    Args:
+        character: The character.
+        states: Its bodies over some frames.
+
+    Returns:
+        (frames - 1, 2) [m]: left, right.
+    """
+    from dynresp.motion.feet.skating_kernel import slides_kernel
+
+    columns = []
+    for side in FEET:
+        foot = character.body(f"{side}_foot")
+        corners = states.positions[:, foot, None] + rotations.rotate(
+            states.quaternions[:, foot, None], sole_points(character, side)
+        )
+        columns.append(slides_kernel(corners, TOUCH))
+    return np.stack(columns, axis=1)
+
+
+def foot_skates(motion: Motion, character: Character) -> list[float]:
+    """How far each foot slides in each of its stances [m].
+
+    Summed over the steps between frames in both of which the foot stands (`motion.contacts`); first
+    the left foot's stances, then the right one's. One frame alone has no step and is no stance.
+    """
+    slides = foot_slides(character, character.kinematics(motion.poses))
+    skates: list[float] = []
+    for way, contact in zip(slides.T, motion.contacts.T, strict=True):
+        standing = np.concatenate([[False], contact[:-1] & contact[1:], [False]])
+        edges = np.flatnonzero(standing[1:] != standing[:-1])
+        skates += [float(way[a:b].sum()) for a, b in edges.reshape(-1, 2)]
+    return skates

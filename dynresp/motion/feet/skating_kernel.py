@@ -1,0 +1,87 @@
+"""The compiled part of `dynresp.motion.feet.skating`.
+
+Importing this module compiles it (about a second) or loads it from numba's cache; import it where
+it is used.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+
+from dynresp.support.compiling import compiled
+
+_CORNERS = types.Array(types.float64, 3, "C", readonly=True)
+
+
+@njit
+def least_way(ways, touching):  # type: ignore[no-untyped-def]
+    """How far the sole's stillest point moves.
+
+    A sole that is turned and shifted moves its points by a linear map of where they are, so the
+    ways of all points between corners fill the hull of the corners' ways; the shortest of them is
+    wanted.
+
+    Args:
+        ways: (4, 2) how far each corner moves over the ground.
+        touching: (4,) which corners the foot stands on; at least one.
+
+    Returns:
+        The way x, y of that point.
+    """
+    best, x, y = np.inf, 0.0, 0.0
+    for i in range(4):
+        for j in range(i, 4):
+            if not (touching[i] and touching[j]):
+                continue
+            ax, ay = ways[i, 0], ways[i, 1]
+            bx, by = ways[j, 0] - ax, ways[j, 1] - ay
+            length = bx * bx + by * by
+            part = 0.0
+            if length > 0.0:
+                part = min(max(-(ax * bx + ay * by) / length, 0.0), 1.0)
+            px, py = ax + part * bx, ay + part * by
+            distance = px * px + py * py
+            if distance < best:
+                best, x, y = distance, px, py
+    for left_out in range(4):
+        positive, negative, corners = 0, 0, 0
+        for k in range(1, 4):
+            i, j = (left_out + k) % 4, (left_out + k % 3 + 1) % 4
+            corners += touching[i]
+            cross = ways[i, 0] * ways[j, 1] - ways[i, 1] * ways[j, 0]
+            positive += cross > 0.0
+            negative += cross < 0.0
+        # None moves at all: the origin lies in the triangle of three ways.
+        if corners == 3 and (positive == 3 or negative == 3):
+            return 0.0, 0.0
+    return x, y
+
+
+@compiled(types.float64[:](_CORNERS, types.float64))
+def slides_kernel(corners, touch):  # type: ignore[no-untyped-def]
+    """How far a foot slides from each frame to the next.
+
+    Args:
+        corners: (frames, 4, 3) where the corners of its sole are [m].
+        touch: How much higher than the lowest a corner that touches is at most [m].
+
+    Returns:
+        (frames - 1,) [m].
+    """
+    slides = np.empty(len(corners) - 1)
+    ways = np.empty((4, 2))
+    touching = np.empty(4, np.bool_)
+    for k in range(len(slides)):
+        lowest = np.inf
+        for c in range(4):
+            lowest = min(lowest, corners[k, c, 2])
+            ways[c, 0] = corners[k + 1, c, 0] - corners[k, c, 0]
+            ways[c, 1] = corners[k + 1, c, 1] - corners[k, c, 1]
+        for c in range(4):
+            touching[c] = corners[k, c, 2] <= lowest + touch
+        x, y = least_way(ways, touching)
+        slides[k] = math.sqrt(x * x + y * y)
+    return slides

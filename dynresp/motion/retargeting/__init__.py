@@ -1,0 +1,1 @@
+"""From any skeleton to the character: joints found, rotations carried over, feet on the floor."""

@@ -1,0 +1,1 @@
+"""Time alignment: the exit from physics and the entry into the reaction."""

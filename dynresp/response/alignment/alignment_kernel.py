@@ -1,0 +1,388 @@
+"""The compiled part of the time alignment: window errors between frames, sampling and descent.
+
+Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
+is used. The error of a pair of windows is that of `window_kernel`. Here a window may begin between
+two frames: positions are interpolated along straight lines, quaternions along the chord, the
+shorter way round, and brought back to unit length.
+
+A track is laid out as seven rows of float32, x y z w i j k, each with the bodies of one frame
+behind those of the frame before. A window is then one stretch of every row wherever it begins, and
+the neighbour frames are the same stretch one frame further on. The loop over that stretch is the
+only hot one. It writes nothing but sums, so that it becomes vector instructions without a look at
+which arrays overlap; the slopes along both times come out of the same pass.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+
+from dynresp.support.compiling import compiled
+
+# Floats in one vector instruction: `LANES` of `dynresp.response.windows.windows`.
+LANES = 8
+
+# The polynomial Q of `window_kernel`: angle = chord Q(chord^2).
+_Q0 = np.float32(2.0000112)
+_Q1 = np.float32(0.08307144)
+_Q2 = np.float32(0.010329804)
+_Q3 = np.float32(0.00022560566)
+_Q4 = np.float32(0.00075941515)
+_R2, _R3, _R4 = np.float32(2.0) * _Q2, np.float32(3.0) * _Q3, np.float32(4.0) * _Q4
+
+_ZERO, _HALF, _ONE, _TWO = (np.float32(v) for v in (0.0, 0.5, 1.0, 2.0))
+# A difference smaller than this [m, or chord] has no direction worth a slope; and a pelvis whose
+# (w, k) is shorter is upside down, has no facing and is not turned.
+_TINY = np.float32(1e-6)
+
+# The share of the descent promised by the slope that a step must bring (Armijo's rule), and how
+# often a step that does not is shortened.
+_ARMIJO = 1e-4
+_SHORTER = 6
+
+_UNIT_TOLERANCE = 1e-3
+
+ROWS = 7
+ERROR, EXIT, ENTRY, EVALUATIONS, SETS, COMPLETE, REFINED, COLUMNS = range(8)
+"""Columns of what `align_kernel` tells of an alignment, and how many there are."""
+
+_TRACK = types.Array(types.float64, 3, "C", readonly=True)
+_TRACKS = types.Array(types.float64, 4, "C", readonly=True)
+_FLOATS = types.Array(types.float32, 1, "C", readonly=True)
+_REALS = types.Array(types.float64, 1, "C", readonly=True)
+_PLACE = types.Array(types.int64, 1, "C", readonly=True)
+_INTS = types.Array(types.int64, 2, "C", readonly=True)
+_INT, _REAL, _OUT = types.int64, types.float64, types.float64[::1]
+_OUTS = types.float64[:, :, ::1]
+# fmt: off
+_LAY_OUT = types.boolean(_TRACK, _TRACK, _INT, types.float32[::1])
+_ALIGN = _INT(_TRACKS, _TRACKS, _INTS, _FLOATS, _INTS, _FLOATS, _FLOATS, _INT, _REALS, _REAL, _INT,
+              _INT, _INT, _REAL, _OUTS)
+_ERRORS = types.boolean(_TRACK, _TRACK, _FLOATS, _PLACE, _FLOATS, _FLOATS, _INT, _REALS, _REALS,
+                        _OUT)
+# fmt: on
+
+# A look for division by zero would keep a loop from becoming vector instructions.
+_PLAIN: dict[str, Any] = {"error_model": "numpy"}
+# Sums may be spread over the lanes of a vector: other bits on another processor, but the same on
+# every call. Input is free of NaN (`lay_out`).
+_FAST: dict[str, Any] = {**_PLAIN, "fastmath": {"contract", "nnan", "nsz", "reassoc"}}
+
+
+@njit(forceinline=True, **_FAST)
+def _heading(track, row, at, share, bodies):  # type: ignore[no-untyped-def]
+    """Ground point and half yaw of the pelvis at a window's first frame, and their rates."""
+    end = at + bodies
+    x, y = track[at], track[row + at]
+    dx, dy = track[end] - x, track[row + end] - y
+    w, k = track[3 * row + at], track[6 * row + at]
+    dw, dk = track[3 * row + end] - w, track[6 * row + end] - k
+    w, k = w + share * dw, k + share * dk
+    square = w * w + k * k
+    if square < _TINY * _TINY:
+        return x + share * dx, y + share * dy, _ONE, _ZERO, dx, dy, _ZERO
+    size = math.sqrt(square)
+    yaw_rate = _TWO * (w * dk - k * dw) / square
+    return x + share * dx, y + share * dy, w / size, k / size, dx, dy, yaw_rate
+
+
+@njit(forceinline=True, **_FAST)
+def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp, wt):  # type: ignore[no-untyped-def]
+    """Error of two windows [m] and its slopes along the first frame of either [m/frame].
+
+    The window of track `a` begins `a_share`, 0 to 1, after its frame `a_frame`; that of `b`
+    likewise. The second is moved onto the first, instead of both to the origin: the same error.
+    """
+    f, g = np.float32(a_share), np.float32(b_share)
+    i, j = a_frame * bodies, b_frame * bodies
+    aox, aoy, ac, as_, aodx, aody, a_yaw = _heading(a, a_row, i, f, bodies)
+    box, boy, bc, bs, bodx, body, b_yaw = _heading(b, b_row, j, g, bodies)
+    # The turn that brings the second window onto the first: its half angle, then its whole.
+    c, s = ac * bc + as_ * bs, as_ * bc - ac * bs
+    cc, ss = c * c - s * s, _TWO * c * s
+    # Unsigned, so that no index needs a look at its sign.
+    n, step = np.uint64(len(wp)), np.uint64(bodies)
+    ax, ay, az = a[i:], a[a_row + i :], a[2 * a_row + i :]
+    aw, ai = a[3 * a_row + i :], a[4 * a_row + i :]
+    aj, ak = a[5 * a_row + i :], a[6 * a_row + i :]
+    bx, by, bz = b[j:], b[b_row + j :], b[2 * b_row + j :]
+    bw, bi = b[3 * b_row + j :], b[4 * b_row + j :]
+    bj, bk = b[5 * b_row + j :], b[6 * b_row + j :]
+    total, along_a, along_b = _ZERO, _ZERO, _ZERO
+    for e in range(n):
+        h = e + step
+        # Positions.
+        vax, vay, vaz = ax[h] - ax[e], ay[h] - ay[e], az[h] - az[e]
+        vbx, vby, vbz = bx[h] - bx[e], by[h] - by[e], bz[h] - bz[e]
+        px, py = bx[e] + g * vbx - box, by[e] + g * vby - boy
+        px, py = cc * px - ss * py, ss * px + cc * py
+        dx, dy = ax[e] + f * vax - aox - px, ay[e] + f * vay - aoy - py
+        dz = az[e] + f * vaz - (bz[e] + g * vbz)
+        distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+        vax, vay, vbx, vby = vax - aodx, vay - aody, vbx - bodx, vby - body
+        vbx, vby = cc * vbx - ss * vby, ss * vbx + cc * vby
+        twist = px * dy - py * dx
+        per_metre = wp[e] / max(distance, _TINY)
+        slope_a = per_metre * (dx * vax + dy * vay + dz * vaz - a_yaw * twist)
+        slope_b = per_metre * (b_yaw * twist - dx * vbx - dy * vby - dz * vbz)
+        # Quaternions: interpolate, bring to unit length, turn the second's.
+        uw, ui, uj, uk = aw[h] - aw[e], ai[h] - ai[e], aj[h] - aj[e], ak[h] - ak[e]
+        qw, qi, qj, qk = aw[e] + f * uw, ai[e] + f * ui, aj[e] + f * uj, ak[e] + f * uk
+        tw, ti, tj, tk = bw[h] - bw[e], bi[h] - bi[e], bj[h] - bj[e], bk[h] - bk[e]
+        rw, ri, rj, rk = bw[e] + g * tw, bi[e] + g * ti, bj[e] + g * tj, bk[e] + g * tk
+        unit_a = _ONE / math.sqrt(qw * qw + qi * qi + qj * qj + qk * qk)
+        unit_b = _ONE / math.sqrt(rw * rw + ri * ri + rj * rj + rk * rk)
+        qw, qi, qj, qk = unit_a * qw, unit_a * qi, unit_a * qj, unit_a * qk
+        rw, ri, rj, rk = unit_b * rw, unit_b * ri, unit_b * rj, unit_b * rk
+        rw, rk, ri, rj = c * rw - s * rk, s * rw + c * rk, c * ri - s * rj, s * ri + c * rj
+        tw, tk, ti, tj = c * tw - s * tk, s * tw + c * tk, c * ti - s * tj, s * ti + c * tj
+        dot = qw * rw + qi * ri + qj * rj + qk * rk
+        sign = _ONE if dot >= _ZERO else -_ONE
+        cw, ci, cj, ck = qw - sign * rw, qi - sign * ri, qj - sign * rj, qk - sign * rk
+        u = cw * cw + ci * ci + cj * cj + ck * ck
+        chord = math.sqrt(u)
+        q = _Q0 + u * (_Q1 + u * (_Q2 + u * (_Q3 + u * _Q4)))
+        total += wp[e] * distance + wt[e] * (chord * q)
+        # d(chord Q) / du, times what u changes by; the turn itself turns with either facing.
+        rise = (_HALF * q + u * (_Q1 + u * (_R2 + u * (_R3 + u * _R4)))) / max(chord, _TINY)
+        rise = sign * wt[e] * rise
+        swing = qk * rw - qw * rk + qj * ri - qi * rj
+        own = qw * uw + qi * ui + qj * uj + qk * uk
+        across = rw * uw + ri * ui + rj * uj + rk * uk
+        along_a += slope_a - rise * (_TWO * unit_a * (across - dot * own) + a_yaw * swing)
+        own = rw * tw + ri * ti + rj * tj + rk * tk
+        across = qw * tw + qi * ti + qj * tj + qk * tk
+        along_b += slope_b - rise * (_TWO * unit_b * (across - dot * own) - b_yaw * swing)
+    return total, along_a, along_b
+
+
+@njit(**_FAST)
+def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):  # type: ignore[no-untyped-def]
+    """Error alone; what the slopes cost falls away when this is compiled."""
+    s, m = int(exit_at), int(entry_at)
+    found = _measure(a, a_row, s, exit_at - s, b, b_row, m, entry_at - m, bodies, wp, wt)
+    return found[0]
+
+
+@njit(**_FAST)
+def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):  # type: ignore[no-untyped-def]
+    """Error and slopes; at the upper ends of the box, the slopes from below."""
+    s, m = int(exit_at), int(entry_at)
+    if exit_at >= last and s == exit_at and s > 0:
+        s -= 1
+    if entry_at >= latest and m == entry_at and m > 0:
+        m -= 1
+    return _measure(a, a_row, s, exit_at - s, b, b_row, m, entry_at - m, bodies, wp, wt)
+
+
+@compiled(_LAY_OUT, **_PLAIN)
+def lay_out(positions, quaternions, frames, rows):  # type: ignore[no-untyped-def]
+    """Lay out a track; one more frame, a copy of the last, and finite padding follow.
+
+    Args:
+        positions: (frames or more, bodies, 3) [m], float64.
+        quaternions: (frames or more, bodies, 4), w x y z.
+        frames: How many of them to take.
+        rows: Out, (7 * row length,) float32. The ground point of the first frame's pelvis is
+            taken off all positions, in double precision; signs of quaternions are chosen so that
+            neighbour frames lie in one hemisphere.
+
+    Returns:
+        Whether all was finite and of unit length.
+    """
+    bodies = positions.shape[1]
+    row = len(rows) // ROWS
+    ox, oy = positions[0, 0, 0], positions[0, 0, 1]
+    for f in range(frames):
+        for b in range(bodies):
+            e = f * bodies + b
+            x, y, z = positions[f, b, 0] - ox, positions[f, b, 1] - oy, positions[f, b, 2]
+            w, i = quaternions[f, b, 0], quaternions[f, b, 1]
+            j, k = quaternions[f, b, 2], quaternions[f, b, 3]
+            size = math.sqrt(w * w + i * i + j * j + k * k)
+            if not (abs(size - 1.0) <= _UNIT_TOLERANCE and math.isfinite(x + y + z)):
+                return False
+            scale = 1.0 / size
+            if f > 0:
+                p = e - bodies
+                dot = w * rows[3 * row + p] + i * rows[4 * row + p]
+                dot += j * rows[5 * row + p] + k * rows[6 * row + p]
+                if dot < 0.0:
+                    scale = -scale
+            rows[e], rows[row + e], rows[2 * row + e] = x, y, z
+            rows[3 * row + e], rows[4 * row + e] = scale * w, scale * i
+            rows[5 * row + e], rows[6 * row + e] = scale * j, scale * k
+    end = frames * bodies
+    for c in range(ROWS):
+        for e in range(end, row):
+            rows[c * row + e] = rows[c * row + e - bodies]
+    return True
+
+
+@njit(**_PLAIN)
+def _free(at, low, high, slope):  # type: ignore[no-untyped-def]
+    """Whether going down the slope stays between the bounds."""
+    return not ((at <= low and slope >= 0.0) or (at >= high and slope <= 0.0))
+
+
+@njit(**_PLAIN)
+def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step, most, gain):  # type: ignore[no-untyped-def]
+    """BFGS from a sample, projected on the box: error, exit, entry and evaluations."""
+    f, gs, gm = _slope(a, a_row, s, last, b, b_row, m, latest, bodies, wp, wt)
+    evaluations = 1
+    # As if the bottom lay half a sample away, until a step has told the curvature.
+    hss = max(math.sqrt(gs * gs + gm * gm) / (0.5 * step), 1e-12)
+    hmm, hsm, told = hss, 0.0, False
+    for _ in range(most):
+        s_free, m_free = _free(s, first, last, gs), _free(m, 0.0, latest, gm)
+        if not (s_free or m_free):
+            break
+        ds = -gs / hss if s_free else 0.0
+        dm = -gm / hmm if m_free else 0.0
+        if s_free and m_free:
+            det = hss * hmm - hsm * hsm
+            ns, nm = (hsm * gm - hmm * gs) / det, (hsm * gs - hss * gm) / det
+            # Where a bound cuts it short, the whole step may lead up.
+            ts, tm = min(max(s + ns, first), last) - s, min(max(m + nm, 0.0), latest) - m
+            if gs * ts + gm * tm < 0.0:
+                ds, dm = ns, nm
+        size, accepted = 1.0, False
+        for _ in range(_SHORTER):
+            s1 = min(max(s + size * ds, first), last)
+            m1 = min(max(m + size * dm, 0.0), latest)
+            promised = gs * (s1 - s) + gm * (m1 - m)
+            if -promised <= gain * f:
+                break
+            f1, gs1, gm1 = _slope(a, a_row, s1, last, b, b_row, m1, latest, bodies, wp, wt)
+            evaluations += 1
+            if f1 <= f + _ARMIJO * promised:
+                accepted = True
+                break
+            # The lowest point of the parabola through both ends with the slope at the first.
+            size *= min(max(-0.5 * promised / (f1 - f - promised), 0.1), 0.5)
+        if not accepted:
+            break
+        xs, xm, ys, ym = s1 - s, m1 - m, gs1 - gs, gm1 - gm
+        bend, length = xs * ys + xm * ym, xs * xs + xm * xm
+        if bend > 1e-9 * length:
+            if not told:
+                hss = hmm = (ys * ys + ym * ym) / bend
+                told = True
+            bs, bm = hss * xs + hsm * xm, hsm * xs + hmm * xm
+            stiff = xs * bs + xm * bm
+            hss += ys * ys / bend - bs * bs / stiff
+            hsm += ys * ym / bend - bs * bm / stiff
+            hmm += ym * ym / bend - bm * bm / stiff
+        small = f - f1 <= gain * f
+        s, m, f, gs, gm = s1, m1, f1, gs1, gm1
+        if small:
+            break
+    return f, s, m, evaluations
+
+
+@compiled(_ALIGN, **_PLAIN)
+def align_kernel(  # type: ignore[no-untyped-def]
+    positions, quaternions, rows, clips, places, wp, wt, frames, exits, step, patience, starts,
+    most, gain, found,
+):  # fmt: skip
+    """Align reactions with traces: samples in sets by exit, then descent from the best of them.
+
+    Args:
+        positions: (traces, frames, bodies, 3) [m], float64; frame 0 is the first contact, body 0
+            the pelvis.
+        quaternions: (traces, frames, bodies, 4), w x y z.
+        rows: (traces, k) reactions to align with each trace.
+        clips: Laid-out clips of all reactions, one behind the other.
+        places: (reactions, 4): where a reaction's clip begins in `clips`, its row length, the
+            frame of the reaction with which it begins, and how many frames later the latest entry
+            is; the earliest is that first frame.
+        wp: Weight of a metre for each body of each frame of a window, padded with zeros.
+        wt: Weight of a radian likewise.
+        frames: Frames in a window.
+        exits: (sets,) exits to sample, rising [frames]; a window after the first must be there.
+        step: Largest distance of the entries to sample [frames].
+        patience: Sets without gain after which sampling is cut.
+        starts: Samples to descend from.
+        most: Steps of a descent, 0 for none.
+        gain: A descent ends where a step brings no more than this share of the error.
+        found: Out, (traces, k, `COLUMNS`).
+
+    Returns:
+        The first trace that is not finite or not of unit length, -1 if there is none.
+    """
+    traces, given, bodies = positions.shape[0], positions.shape[1], positions.shape[2]
+    sets = 0
+    while sets < len(exits) and math.ceil(exits[sets]) + frames <= given:
+        sets += 1
+    used = math.ceil(exits[sets - 1]) + frames
+    a_row = (used + 1) * bodies + LANES
+    a = np.empty(ROWS * a_row, np.float32)
+    for n in range(traces):
+        if not lay_out(positions[n], quaternions[n], used, a):
+            return n
+        for r in range(rows.shape[1]):
+            place = places[rows[n, r]]
+            b_row, latest = place[1], float(place[3])
+            b = clips[place[0] : place[0] + ROWS * b_row]
+            entries = math.ceil(latest / step - 1e-9) + 1
+            errors = np.empty((sets, entries), np.float32)
+            apart = latest / max(entries - 1, 1)
+            best, without, tried = np.float32(np.inf), 0, 0
+            while tried < sets and without < patience:
+                without += 1
+                for e in range(entries):
+                    error = _error(a, a_row, exits[tried], b, b_row, e * apart, bodies, wp, wt)
+                    errors[tried, e] = error
+                    if error < best:
+                        best, without = error, 0
+                tried += 1
+            out = found[n, r]
+            out[ERROR] = np.inf
+            out[EVALUATIONS] = tried * entries
+            out[SETS] = tried
+            out[COMPLETE] = tried == len(exits) or without >= patience
+            for _ in range(starts):
+                s, e = divmod(errors[:tried].argmin(), entries)
+                lowest = errors[s, e]
+                if lowest == np.inf:
+                    break
+                # Its neighbours belong to the same valley.
+                errors[max(s - 1, 0) : s + 2, max(e - 1, 0) : e + 2] = np.inf
+                if lowest < out[ERROR]:
+                    out[REFINED] = 0.0
+                    out[ERROR], out[EXIT], out[ENTRY] = lowest, exits[s], e * apart + place[2]
+                if most > 0:
+                    error, at, entry, cost = _descend(
+                        a, a_row, exits[0], exits[tried - 1], b, b_row, latest, bodies, wp, wt,
+                        exits[s], e * apart, step, most, gain,
+                    )  # fmt: skip
+                    out[EVALUATIONS] += cost
+                    if error < out[ERROR]:
+                        out[REFINED] = 1.0
+                        out[ERROR], out[EXIT], out[ENTRY] = error, at, entry + place[2]
+    return -1
+
+
+@compiled(_ERRORS, **_PLAIN)
+def errors_kernel(  # type: ignore[no-untyped-def]
+    positions, quaternions, clips, place, wp, wt, frames, exits, entries, errors
+):
+    """Errors (pairs,) of windows that begin anywhere between frames, in `errors` [m].
+
+    `place` is the reaction's row of `places`; all else is as for `align_kernel`, with one trace.
+    False if the trace is not finite or not of unit length as far as it is needed.
+    """
+    bodies = positions.shape[1]
+    used = math.ceil(exits.max()) + frames
+    a_row = (used + 1) * bodies + LANES
+    a = np.empty(ROWS * a_row, np.float32)
+    if not lay_out(positions, quaternions, used, a):
+        return False
+    b_row = place[1]
+    b = clips[place[0] : place[0] + ROWS * b_row]
+    for p in range(len(exits)):
+        errors[p] = _error(a, a_row, exits[p], b, b_row, entries[p] - place[2], bodies, wp, wt)
+    return True

@@ -1,0 +1,1 @@
+"""The classifier: features of a hit, its file, and its compiled prediction."""

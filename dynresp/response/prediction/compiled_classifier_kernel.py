@@ -1,0 +1,257 @@
+"""The compiled inner loops of prediction: all pairs of classes, or only those that decide.
+
+Importing this module compiles it (a few seconds) or loads it from numba's cache; import it where
+it is used. The kernels go row by row with the same instructions, so a row has the same result,
+bit by bit, alone and in any batch.
+
+`scores` are votes of all pairs of classes, and a bounded confidence that orders equal votes. The
+best class is found without most of the pairs. First a knock-out: every class meets the leader so
+far, and the better one leads. Then the leader meets those it has not met yet, which gives its
+score. Other classes have lost at least once by then: where the leader has lost to none, no other
+can have its votes. Where it has lost, as in a circle of three that beat one another, those with no
+more losses than it are looked at in the same way until none is left that could match it. The next
+places are found likewise among the rest, with what is already known.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from dynresp.support.compiling import compiled
+
+LANES = 64
+"""Rows of weights are padded with zeros to a multiple of this, so that loops have no remainder."""
+
+# Principal components beyond this are no measurement; their products would leave single precision.
+_LARGEST = 1e9
+# Rows that share one reading of the projection; their features stay in the first-level cache.
+_BLOCK = 8
+
+# Sums of products may be spread over vector lanes; NaN is respected, since it is looked for.
+_FASTMATH = {"reassoc", "contract", "nsz"}
+
+_ROWS = types.Array(types.float64, 2, "C", readonly=True)
+_SINGLE = types.Array(types.float32, 2, "C", readonly=True)
+_VECTOR = types.Array(types.float64, 1, "C", readonly=True)
+
+
+@njit(fastmath=_FASTMATH)
+def _project(features, projection, offset, reduced):  # type: ignore[no-untyped-def]
+    """Principal components of some rows; index of the first row out of range, -1 if none is.
+
+    NaN or infinity among the features reaches every component, be it by 0 * inf = NaN.
+    """
+    bad = len(features)
+    for c in range(len(projection)):
+        for n in range(len(features)):
+            value = 0.0
+            for i in range(features.shape[1]):
+                value += projection[c, i] * features[n, i]
+            value += offset[c]
+            if not abs(value) < _LARGEST:
+                bad = min(bad, n)
+            reduced[n, c] = value
+    return bad if bad < len(features) else -1
+
+
+@njit
+def _expand(reduced, monomials):  # type: ignore[no-untyped-def]
+    """Monomials of the principal components of one row, without the padding."""
+    components = len(reduced)
+    monomials[0] = 1
+    at = 1
+    for c in range(components):
+        monomials[at + c] = reduced[c]
+    at += components
+    for c in range(components):
+        factor = reduced[c]
+        for d in range(components - c):
+            monomials[at + d] = factor * reduced[c + d]
+        at += components - c
+
+
+@njit
+def _pair(first, second, classes):  # type: ignore[no-untyped-def]
+    """Place of the pair of two classes, in either order, among all pairs."""
+    low, high = min(first, second), max(first, second)
+    return low * (2 * classes - low - 1) // 2 + high - low - 1
+
+
+@njit
+def _score(c, classes, decisions):  # type: ignore[no-untyped-def]
+    """Votes and bounded confidence of one class, added in scikit-learn's order."""
+    votes, confidence = 0.0, 0.0
+    for other in range(classes):
+        if other != c:
+            decision = np.float64(decisions[_pair(c, other, classes)])
+            if (decision < 0.0) == (c > other):
+                votes += 1.0
+            confidence += decision if c < other else -decision
+    return votes + confidence / (3.0 * (abs(confidence) + 1.0))
+
+
+@njit(fastmath=_FASTMATH)
+def _next_best(  # type: ignore[no-untyped-def]
+    classes, weights, monomials, decisions, known, losses, scored, placed, scores
+):
+    """The class of the highest score among those not placed; evaluates what that takes."""
+    best = -1
+    for c in range(classes):
+        if scored[c] and not placed[c] and (best < 0 or scores[c] > scores[best]):
+            best = c
+    while True:
+        leader = -1
+        for c in range(classes):
+            if not placed[c] and not scored[c] and (leader < 0 or losses[c] < losses[leader]):
+                leader = c
+        # Votes decide before confidences do: a class with more losses cannot come first.
+        if leader < 0 or (best >= 0 and losses[leader] > losses[best]):
+            return best
+        # First the knock-out, then the leader against all. Written as one loop, without helpers
+        # that take arrays: counting their references took most of the time.
+        for step in range(2 * classes):
+            knock_out = step < classes
+            c = step if knock_out else step - classes
+            if c == leader:
+                continue
+            if knock_out:
+                if placed[c] or scored[c] or losses[c] > losses[leader]:
+                    continue
+            elif best >= 0 and losses[leader] > losses[best]:
+                break
+            pair = _pair(leader, c, classes)
+            if known[pair]:
+                continue
+            total = weights.dtype.type(0)
+            for i in range(len(monomials)):
+                total += weights[pair, i] * monomials[i]
+            decisions[pair] = total
+            known[pair] = True
+            if (total < 0) == (leader > c):
+                losses[c] += 1
+            else:
+                losses[leader] += 1
+                if knock_out:
+                    leader = c
+        if best >= 0 and losses[leader] > losses[best]:
+            continue
+        scored[leader] = True
+        scores[leader] = _score(leader, classes, decisions)
+        if (
+            best < 0
+            or scores[leader] > scores[best]
+            or (scores[leader] == scores[best] and leader < best)
+        ):
+            best = leader
+
+
+@njit(fastmath=_FASTMATH)
+def _all_pairs(weights, monomials, decisions):  # type: ignore[no-untyped-def]
+    """Decisions of all pairs for some rows; each row of weights is read once."""
+    for pair in range(len(weights)):
+        for n in range(len(decisions)):
+            total = weights.dtype.type(0)
+            for i in range(monomials.shape[1]):
+                total += weights[pair, i] * monomials[n, i]
+            decisions[n, pair] = total
+
+
+@compiled(
+    [
+        types.int64(_ROWS, _ROWS, _VECTOR, weights, types.int64, types.int64[:, ::1])
+        for weights in (_ROWS, _SINGLE)
+    ]
+)
+def rank_kernel(features, projection, offset, weights, classes, ranks):  # type: ignore[no-untyped-def]
+    """Find the best classes of every row, evaluating only pairs that can matter.
+
+    Args:
+        features: (n, F) float64.
+        projection: (k, F) float64.
+        offset: (k,) float64.
+        weights: (pairs, monomials padded to a multiple of `LANES`) float64 or float32.
+        classes: Number of classes.
+        ranks: Out, (n, best) indices of classes, the highest score first, of equal scores the
+            lowest index first.
+
+    Returns:
+        Index of the first row that is not finite or out of range, -1 if there is none.
+    """
+    reduced = np.empty((_BLOCK, len(projection)), weights.dtype)
+    monomials = np.zeros(weights.shape[1], weights.dtype)
+    decisions = np.empty(len(weights), weights.dtype)
+    known = np.empty(len(weights), np.bool_)
+    losses = np.empty(classes, np.int64)
+    scored = np.empty(classes, np.bool_)
+    placed = np.empty(classes, np.bool_)
+    scores = np.empty(classes)
+    for start in range(0, len(features), _BLOCK):
+        stop = min(start + _BLOCK, len(features))
+        bad = _project(features[start:stop], projection, offset, reduced)
+        if bad >= 0:
+            return start + bad
+        for n in range(start, stop):
+            _expand(reduced[n - start], monomials)
+            known[:] = False
+            losses[:] = 0
+            scored[:] = False
+            placed[:] = False
+            for place in range(ranks.shape[1]):
+                best = _next_best(
+                    classes, weights, monomials, decisions, known, losses, scored, placed, scores
+                )
+                placed[best] = True
+                ranks[n, place] = best
+    return -1
+
+
+@compiled(
+    [
+        types.int64(_ROWS, _ROWS, _VECTOR, weights, types.Array(scalar, 2, "C"))
+        for weights, scalar in ((_ROWS, types.float64), (_SINGLE, types.float32))
+    ]
+)
+def decision_kernel(features, projection, offset, weights, decisions):  # type: ignore[no-untyped-def]
+    """Evaluate all pairs of every row.
+
+    Args:
+        features: As for `rank_kernel`, and so are `projection`, `offset` and `weights`.
+        projection: See there.
+        offset: See there.
+        weights: See there.
+        decisions: Out, (n, pairs) in the precision of `weights`.
+
+    Returns:
+        Index of the first row that is not finite or out of range, -1 if there is none.
+    """
+    reduced = np.empty((_BLOCK, len(projection)), weights.dtype)
+    monomials = np.zeros((_BLOCK, weights.shape[1]), weights.dtype)
+    for start in range(0, len(features), _BLOCK):
+        stop = min(start + _BLOCK, len(features))
+        bad = _project(features[start:stop], projection, offset, reduced)
+        if bad >= 0:
+            return start + bad
+        for n in range(stop - start):
+            _expand(reduced[n], monomials[n])
+        _all_pairs(weights, monomials, decisions[start:stop])
+    return -1
+
+
+@compiled(
+    [
+        types.void(types.int64, types.Array(scalar, 2, "C"), types.float64[:, ::1])
+        for scalar in (types.float64, types.float32)
+    ]
+)
+def score_kernel(classes, decisions, scores):  # type: ignore[no-untyped-def]
+    """Scores of all classes of every row, as scikit-learn's `decision_function` has them.
+
+    Args:
+        classes: Number of classes.
+        decisions: (n, pairs) float64 or float32.
+        scores: Out, (n, classes).
+    """
+    for n in range(len(decisions)):
+        for c in range(classes):
+            scores[n, c] = _score(c, classes, decisions[n])

@@ -1,0 +1,155 @@
+"""How good a response is, in numbers. `docs/quality.md` says what each means.
+
+All are taken from the finished motion at its own frame rate (30 fps); only the root's jump also
+needs what the simulation and the reaction would have done at the seams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynresp.motion import rotations
+from dynresp.motion.character import ROOT, ROOT_QUAT, Character
+from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.ground import clearances
+from dynresp.motion.motion import FEET, Motion
+from dynresp.motion.rotations import FloatArray
+from dynresp.response.response import Response
+
+# A motion that stands still has hardly any joint speed steps; a seam is then measured against this
+# [rad/s], about the sway of a standing person.
+_LEAST_REFERENCE = 0.1
+# The share of joint speed steps in the motion entered that a seam is measured against.
+_PERCENTILE = 99.9
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Figures of one response.
+
+    A "seam" is where physics hands over to the blend, or where the blend ends.
+
+    Attributes:
+        speed_step_exit: Largest joint speed step at the first seam [rad/s].
+        speed_step_end: The same at the second seam [rad/s].
+        speed_step_reference: 99.9th percentile of the joint speed steps in the motion entered,
+            at least 0.1 rad/s.
+        speed_step_ratio: The larger of the two over the reference.
+        root_jump_m: How far the root departs at a seam, in one frame, from the simulation that it
+            leaves or the reaction that it joins [m].
+        root_jump_deg: The same of its orientation [degrees].
+        root_shake_m: How unsteady the root's own step is at a seam, whatever the reason: a hit
+            that still shakes the body counts as well [m].
+        root_shake_deg: The same of its orientation [degrees].
+        foot_skate_m: Way that standing feet slide, from contact to the end, both feet [m].
+        foot_skate_worst_m: The farthest that one foot slides in one stance [m].
+        foot_skate_blend_m: Way that standing feet slide in the blend, from exit to end, both feet
+            [m].
+        foot_depth_m: How deep a foot gets into the ground, from contact to the end [m].
+        body_depth_m: How deep any other body gets [m].
+        free_physics_s: Time from contact to the exit [s].
+        physics_s: Time from contact until the blend has ended, while the simulation has a say [s].
+    """
+
+    speed_step_exit: float
+    speed_step_end: float
+    speed_step_reference: float
+    speed_step_ratio: float
+    root_jump_m: float
+    root_jump_deg: float
+    root_shake_m: float
+    root_shake_deg: float
+    foot_skate_m: float
+    foot_skate_worst_m: float
+    foot_skate_blend_m: float
+    foot_depth_m: float
+    body_depth_m: float
+    free_physics_s: float
+    physics_s: float
+
+
+def measure(response: Response, character: Character) -> Quality | None:
+    """Figures of a response; None where nothing was hit or the simulation diverged."""
+    if response.exit is None or response.end is None or response.contact_frame is None:
+        return None
+    assert response.entered is not None
+    motion = response.motion
+    steps = joint_speed_steps(motion)
+    at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
+    own = joint_speed_steps(response.entered)
+    reference = max(float(np.percentile(own, _PERCENTILE)) if own.size else 0.0, _LEAST_REFERENCE)
+    assert response.left is not None
+    assert response.joined is not None
+    jumps = [
+        _root_distance(motion.poses[response.exit + 1], response.left),
+        _root_distance(motion.poses[response.end - 1], response.joined),
+    ]
+    # The first step of the blend, and the last.
+    shakes = [root_shake(motion, k) for k in (response.exit, response.end - 1)]
+    after = motion.slice(response.contact_frame, len(motion))
+    states = character.kinematics(after.poses)
+    depth = np.maximum(0.0, -clearances(character, states))
+    feet = [character.body(f"{side}_foot") for side in FEET]
+    skates = foot_skates(after, character)
+    blend = motion.slice(response.exit, response.end + 1)
+    return Quality(
+        speed_step_exit=at_seams[0],
+        speed_step_end=at_seams[1],
+        speed_step_reference=reference,
+        speed_step_ratio=max(at_seams) / reference,
+        root_jump_m=max(jump[0] for jump in jumps),
+        root_jump_deg=max(jump[1] for jump in jumps),
+        root_shake_m=max(shake[0] for shake in shakes),
+        root_shake_deg=max(shake[1] for shake in shakes),
+        foot_skate_m=float(sum(skates)),
+        foot_skate_worst_m=float(max(skates, default=0.0)),
+        foot_skate_blend_m=float(sum(foot_skates(blend, character))),
+        foot_depth_m=float(depth[:, feet].max()),
+        body_depth_m=float(np.delete(depth, feet, axis=1).max()),
+        free_physics_s=(response.exit - response.contact_frame) / motion.fps,
+        physics_s=(response.end - response.contact_frame) / motion.fps,
+    )
+
+
+def joint_speed_steps(motion: Motion) -> FloatArray:
+    """Change of each joint's angular velocity from one frame step to the next.
+
+    Returns:
+        (frames - 2, 13) [rad/s]; row k is the change at frame k + 1. As vectors, so a joint that
+        turns about another axis at the same speed counts.
+    """
+    q = motion.joint_quaternions
+    turns = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
+    return np.linalg.norm(np.diff(turns, axis=0), axis=-1) * motion.fps
+
+
+def _root_distance(pose: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """Distance [m] and angle [degrees] between the roots of two poses."""
+    angle = rotations.angle_between(pose[ROOT_QUAT], other[ROOT_QUAT])
+    return float(np.linalg.norm(pose[ROOT] - other[ROOT])), float(np.degrees(angle))
+
+
+def root_shake(motion: Motion, frame: int) -> tuple[float, float]:
+    """How unsteady the root's step is from a frame to the next, its smooth movement taken out.
+
+    What the step is more than the mean of the steps before and after it. A smooth movement has
+    none, whatever its speed and acceleration; a shift between the two frames comes out as that
+    shift.
+
+    Args:
+        motion: Any motion.
+        frame: The frame before the step; there must be one frame before it and two after.
+
+    Returns:
+        Position [m] and orientation [degrees].
+    """
+    near = motion.slice(frame - 1, frame + 3)
+    q = near.root_quaternions
+    turns = rotations.to_rotation_vector(rotations.multiply(q[1:], rotations.conjugate(q[:-1])))
+    found = [
+        float(np.linalg.norm(step - 0.5 * (before + after)))
+        for before, step, after in (np.diff(near.root_positions, axis=0), turns)
+    ]
+    return found[0], float(np.degrees(found[1]))

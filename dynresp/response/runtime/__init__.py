@@ -1,0 +1,1 @@
+"""Characters at run time: hit at any moment, advanced frame by frame."""

@@ -1,0 +1,191 @@
+"""The oracle: exhaustive search of all reactions for the best moment to leave the simulation.
+
+Every exit frame of a simulated trace is compared with every entry frame of every reaction by the
+window error of Zordan et al. 2007 (section 5). It labels the training data of the classifier, and
+it is what faster ways of aligning are measured against.
+
+Two float32 evaluations of an error agree with exact arithmetic within 1e-4 relative plus
+`ERROR_FLOOR`; two searches of the same windows agree in every bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.response.windows.windows import LANES, LibraryWindows, WindowSet
+from dynresp.support.errors import MotionError
+
+ERROR_FLOOR = 2e-5
+"""Absolute uncertainty of an error [m], for 14 bodies a few metres from the pelvis and weights of
+the order of one: what float32 leaves where two windows are equal."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """Where a reaction fits the simulation best.
+
+    Attributes:
+        reaction: Name of the reaction.
+        error: Window error [m], weighted and summed over the bodies.
+        exit_frame: Frame of the trace to leave, counted from contact.
+        entry_frame: Frame of the reaction clip to enter.
+    """
+
+    reaction: str
+    error: float
+    exit_frame: int
+    entry_frame: int
+
+
+@dataclass(frozen=True)
+class ErrorSurface:
+    """Window errors of one reaction for all exits and entries.
+
+    Attributes:
+        errors: (exits, entries) [m], float32.
+        exit_frames: (exits,) frames of the trace.
+        entry_frames: (entries,) frames of the reaction clip.
+    """
+
+    errors: npt.NDArray[np.float32]
+    exit_frames: npt.NDArray[np.int64]
+    entry_frames: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class OracleResult:
+    """What an exhaustive search found.
+
+    Attributes:
+        names: Names of the reactions, in the order of the library.
+        errors: (reactions,) least error of each [m], float32.
+        exit_frames: (reactions,) frame of the trace where it is reached.
+        entry_frames: (reactions,) frame of the reaction clip where it is reached.
+        trace: The windows that were searched with.
+        library: The windows that were searched.
+    """
+
+    names: tuple[str, ...]
+    errors: npt.NDArray[np.float32]
+    exit_frames: npt.NDArray[np.int64]
+    entry_frames: npt.NDArray[np.int64]
+    trace: WindowSet
+    library: LibraryWindows
+
+    @property
+    def best(self) -> Match:
+        """The best of all reactions.
+
+        Of equal errors the lowest exit frame wins, then the lowest entry frame, then the first
+        reaction.
+        """
+        return self._match(int(np.lexsort((self.entry_frames, self.exit_frames, self.errors))[0]))
+
+    def match(self, reaction: str) -> Match:
+        """The best match of one reaction.
+
+        Raises:
+            UnknownNameError: There is no such reaction.
+        """
+        return self._match(self.library.index(reaction))
+
+    def surface(self, reaction: str) -> ErrorSurface:
+        """All errors of one reaction, computed when asked for.
+
+        Raises:
+            UnknownNameError: There is no such reaction.
+        """
+        library = self.library.subset([reaction])
+        *_, errors = _run(self.trace, library, early_stop=False)
+        entries = library.windows[0].starts
+        return ErrorSurface(errors[:, : len(entries)], self.trace.starts, entries)
+
+    def _match(self, row: int) -> Match:
+        return Match(
+            reaction=self.names[row],
+            error=float(self.errors[row]),
+            exit_frame=int(self.exit_frames[row]),
+            entry_frame=int(self.entry_frames[row]),
+        )
+
+
+def search(trace: WindowSet, library: LibraryWindows, *, early_stop: bool = True) -> OracleResult:
+    """Find the best exit and entry for every reaction, on one thread.
+
+    Args:
+        trace: Windows of the simulated trace (`windows.trace_windows`).
+        library: Windows of the reactions (`windows.library_windows`), made with the same
+            configuration.
+        early_stop: Leave out pairs of windows as soon as they can no longer win. The result is the
+            same to the last bit; False is for measuring what every pair costs.
+
+    Returns:
+        The best match of every reaction; of equal errors the lowest exit frame, then the lowest
+        entry frame.
+
+    Raises:
+        MotionError: Trace and library were made with different configurations or differ in their
+            number of bodies.
+    """
+    if trace.config != library.config:
+        raise MotionError(
+            f"the trace was cut with {trace.config}, the library with {library.config}. "
+            "Cut both with one configuration."
+        )
+    if trace.bodies != library.windows[0].bodies:
+        raise MotionError(
+            f"the trace has {trace.bodies} bodies, the library {library.windows[0].bodies}. "
+            "Both must be of one character."
+        )
+    errors, exits, entries, _ = _run(trace, library, early_stop=early_stop)
+    starts = [w.starts[at] for w, at in zip(library.windows, entries, strict=True)]
+    return OracleResult(
+        names=library.names,
+        errors=errors,
+        exit_frames=trace.starts[exits],
+        entry_frames=np.array(starts, dtype=np.int64),
+        trace=trace,
+        library=library,
+    )
+
+
+def _run(
+    trace: WindowSet, library: LibraryWindows, *, early_stop: bool
+) -> tuple[
+    npt.NDArray[np.float32],
+    npt.NDArray[np.int64],
+    npt.NDArray[np.int64],
+    npt.NDArray[np.float32],
+]:
+    """Call the kernel: least errors, their exit and entry indices, and its scratch."""
+    # numba takes a third of a second to import, the kernel one more when it is first compiled.
+    from dynresp.response.windows.window_kernel import search_kernel
+
+    config = library.config
+    frame_weights = config.frame_weights()[:, None]
+    position_weight, angle_weight = config.body_weights(trace.bodies)
+    reactions = len(library.names)
+    errors = np.empty(reactions, np.float32)
+    exits = np.empty(reactions, np.int64)
+    entries = np.empty(reactions, np.int64)
+    widest = max(windows.data.shape[3] for windows in library.windows)
+    scratch = np.empty((len(trace), widest), np.float32)
+    search_kernel(
+        trace.data,
+        len(trace),
+        library.buffer,
+        library.offsets,
+        np.array([len(windows) for windows in library.windows], np.int64),
+        (frame_weights * position_weight).astype(np.float32),
+        (frame_weights * angle_weight).astype(np.float32),
+        LANES,
+        early_stop,
+        errors,
+        exits,
+        entries,
+        scratch,
+    )
+    return errors, exits, entries, scratch

@@ -1,0 +1,135 @@
+"""The choice of the oracle: all reactions and the base motion searched through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.motion.character import Character
+from dynresp.motion.reactions.reaction_library import ReactionLibrary
+from dynresp.response.choice import Choice
+from dynresp.response.look_ahead import LookAhead
+from dynresp.response.response import CARRY_ON, ResponseConfig
+from dynresp.response.search.carry_on import BaseFit, search_base_motions
+from dynresp.response.search.full_search import OracleResult, search
+from dynresp.response.windows.windows import (
+    LibraryWindows,
+    ReactionTrack,
+    library_windows,
+    make_many_windows,
+)
+
+
+@dataclass(frozen=True)
+class OracleAnswer:
+    """What the search found for one hit.
+
+    Attributes:
+        library: Of all reactions.
+        carry_on: How the base motion fits.
+        stays: Whether the base motion is carried on.
+    """
+
+    library: OracleResult
+    carry_on: BaseFit
+    stays: bool
+
+
+def reaction_tracks(
+    character: Character, library: ReactionLibrary, config: ResponseConfig
+) -> list[ReactionTrack]:
+    """Bodies of all reactions, with the frames at which each may be entered.
+
+    From its first frame to `entry_max_s`, as long as enough of it is left then.
+    """
+    tracks = []
+    for reaction in library.reactions:
+        states = character.kinematics(reaction.motion.poses)
+        bounds = entry_range(len(reaction.motion), config)
+        tracks.append(ReactionTrack(reaction.name, states.centers, states.quaternions, bounds))
+    return tracks
+
+
+def entry_range(frames: int, config: ResponseConfig) -> tuple[int, int]:
+    """Frames [first, last) at which a reaction of so many frames may be entered."""
+    fps = config.physics.fps
+    left = round(max(config.remaining_s, config.transition.blend_s + 2 / fps) * fps)
+    left = max(left, config.window.window_frames - 1)
+    latest = round(config.entry_max_s * fps) + 1
+    return 0, max(1, min(latest, frames - left))
+
+
+class OracleChooser:
+    """Chooses by exhaustive search (Zordan et al. 2005; 2007, section 4).
+
+    A graze is carried on through. Else the reaction of the least window error is chosen, unless
+    the base motion, where it must fit, fits better still and well enough
+    (`ResponseConfig.carry_on_max_error`).
+    """
+
+    def __init__(
+        self, character: Character, library: ReactionLibrary, config: ResponseConfig
+    ) -> None:
+        """Cut the library's windows once.
+
+        Raises:
+            MotionError: A clip is shorter than a window.
+        """
+        self.character = character
+        self.library = library
+        self.config = config
+        tracks = reaction_tracks(character, library, config)
+        self.windows: LibraryWindows = library_windows(tracks, config.window)
+
+    def choose(self, hits: LookAhead) -> list[Choice]:
+        """Choose for each hit."""
+        choices = []
+        for base, answer in zip(hits.bases, self.answers(hits), strict=True):
+            best, stay = answer.library.best, answer.carry_on
+            found = zip(answer.library.names, answer.library.errors, strict=True)
+            errors = {name: float(e) for name, e in found} | {CARRY_ON: stay.error}
+            if answer.stays:
+                choice = Choice(CARRY_ON, base, stay.exit, stay.entry, stay.error, errors)
+            else:
+                motion = self.library.reaction(best.reaction).motion
+                place = (best.exit_frame, best.entry_frame)
+                choice = Choice(best.reaction, motion, *place, best.error, errors)
+            choices.append(choice)
+        return choices
+
+    def answers(self, hits: LookAhead) -> list[OracleAnswer]:
+        """Search for each hit; each is bitwise what it would be alone."""
+        if not len(hits):
+            return []
+        window = self.config.window
+        cuts = make_many_windows(
+            hits.states.centers, hits.states.quaternions, window.exit_frames, window
+        )
+        carried = search_base_motions(self.character, self.config, hits)
+        answers = []
+        for cut, stay, graze in zip(cuts, carried, hits.grazes, strict=True):
+            found = search(cut, self.windows)
+            limit = min(found.best.error, self.config.carry_on_max_error)
+            answers.append(OracleAnswer(found, stay, bool(graze) or stay.error <= limit))
+        return answers
+
+
+def choice_columns(
+    answers: list[OracleAnswer],
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64], npt.NDArray[np.int64], list[int]]:
+    """What the oracle found for each hit as arrays over all classes, carrying on the last.
+
+    Returns:
+        Errors [m], exit frames after contact and entry frames, each (hits, reactions + 1), and
+        the class chosen for each hit. The entry of carrying on counts in the base motion.
+    """
+    errors = [[*a.library.errors, a.carry_on.error] for a in answers]
+    exits = [[*a.library.exit_frames, a.carry_on.exit] for a in answers]
+    entries = [[*a.library.entry_frames, a.carry_on.entry] for a in answers]
+    chosen = [
+        len(a.library.names) if a.stays else a.library.names.index(a.library.best.reaction)
+        for a in answers
+    ]
+    return np.array(errors, np.float32), np.array(exits), np.array(entries), chosen

@@ -1,0 +1,1 @@
+"""From the simulation back to motion capture: the blend and the motion after it."""

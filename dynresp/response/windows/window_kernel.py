@@ -1,0 +1,185 @@
+"""The compiled inner loop of the window search.
+
+Importing this module compiles it (one to two seconds) or loads it from numba's cache; import it
+where it is used. The error of a pair of windows is (Zordan et al. 2007, section 5)
+
+    E = sum_i w_i sum_b ( wp_b |p_b - p'_b| + wt_b angle(q_b, q'_b) ),   sum_i w_i = 1,
+
+summed frame by frame and body by body in float32. The innermost loop runs over the entry windows,
+which lie side by side in memory and become the lanes of vector instructions; no sum runs across
+lanes, so the order of additions, and with it every bit of the result, is fixed.
+
+The angle is taken from the chord c = |q - q'| of the nearer of q' and -q', angle = 4 asin(c / 2).
+Unlike acos of the dot product, that keeps its digits near the identity, and as c * Q(c^2) with a
+polynomial Q it needs no branch and no library call.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+
+from dynresp.support.compiling import compiled
+
+# Q(u) = 4 asin(sqrt(u) / 2) / sqrt(u) on 0 <= u <= 2 (rotations up to 180 degrees): weighted least
+# squares driven to the smallest largest relative error, 5.8e-6. Two more terms would bring 1.8e-7
+# and cost an eighth more time.
+_Q0 = np.float32(2.0000112)
+_Q1 = np.float32(0.08307144)
+_Q2 = np.float32(0.010329804)
+_Q3 = np.float32(0.00022560566)
+_Q4 = np.float32(0.00075941515)
+
+# A pair drops others only when they exceed it by more than rounding could explain.
+_SLACK = np.float32(1.0001)
+_FLOOR = np.float32(1e-5)
+_ZERO = np.float32(0.0)
+
+_FLOATS = types.Array(types.float32, 1, "C", readonly=True)
+_WEIGHTS = types.Array(types.float32, 2, "C", readonly=True)
+_WINDOWS = types.Array(types.float32, 4, "C", readonly=True)
+_INTS = types.Array(types.int64, 1, "C", readonly=True)
+_SIGNATURE = types.void(
+    _WINDOWS,
+    types.int64,
+    _FLOATS,
+    _INTS,
+    _INTS,
+    _WEIGHTS,
+    _WEIGHTS,
+    types.int64,
+    types.boolean,
+    types.float32[::1],
+    types.int64[::1],
+    types.int64[::1],
+    types.float32[:, ::1],
+)
+# No reassociation, so that the order of additions stands; input is free of NaN (`make_windows`).
+_FASTMATH = {"contract", "nnan", "nsz"}
+
+
+@njit(inline="always")
+def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):  # type: ignore[no-untyped-def]
+    """Weighted difference of two states of a body."""
+    x, y, z = ax - bx, ay - by, az - bz
+    distance = math.sqrt(x * x + y * y + z * z)
+    w, i, j, k = aw - bw, ai - bi, aj - bj, ak - bk
+    near = w * w + i * i + j * j + k * k
+    w, i, j, k = aw + bw, ai + bi, aj + bj, ak + bk
+    u = min(near, w * w + i * i + j * j + k * k)
+    q = _Q0 + u * (_Q1 + u * (_Q2 + u * (_Q3 + u * _Q4)))
+    return wp * distance + wt * (math.sqrt(u) * q)
+
+
+@compiled(_SIGNATURE, fastmath=_FASTMATH)
+def search_kernel(  # type: ignore[no-untyped-def]
+    trace,
+    exits,
+    buffer,
+    offsets,
+    counts,
+    position_weights,
+    angle_weights,
+    lanes,
+    early_stop,
+    best_errors,
+    best_exits,
+    best_entries,
+    errors,
+):
+    """Find the best pair of windows of every reaction.
+
+    With `early_stop`, entries at both ends of an exit's row are dropped as soon as the error
+    summed so far exceeds the whole error of some other pair. Terms are never negative, so what is
+    dropped could not have won, and what is kept is summed as it would have been: same result.
+
+    Args:
+        trace: (frames, bodies, 7, exits padded) float32.
+        exits: Number of exits without padding.
+        buffer: Windows of the reactions, each (frames, bodies, 7, entries padded), flat float32.
+        offsets: (reactions,) where each reaction begins in `buffer`.
+        counts: (reactions,) entries of each reaction without padding.
+        position_weights: (frames, bodies), w_i wp_b.
+        angle_weights: (frames, bodies), w_i wt_b.
+        lanes: Windows are padded to a multiple of this; rows are cut at multiples of it.
+        early_stop: Whether to drop pairs that cannot win.
+        best_errors: Out, (reactions,).
+        best_exits: Out, (reactions,) index of the exit; of equal errors the lowest exit, then the
+            lowest entry.
+        best_entries: Out, (reactions,) index of the entry.
+        errors: Scratch, (exits, largest padded count); holds all errors of the last reaction
+            afterwards if `early_stop` is off.
+    """
+    frames, bodies = trace.shape[0], trace.shape[1]
+    low = np.empty(exits, np.int64)
+    high = np.empty(exits, np.int64)
+    for r in range(len(offsets)):
+        count = counts[r]
+        padded = (count + lanes - 1) // lanes * lanes
+        low[:] = 0
+        high[:] = padded
+        errors[:, :padded] = _ZERO
+        bound = np.float32(np.inf)
+        tried_exit, tried_entry = -1, -1
+        for f in range(frames):
+            for b in range(bodies):
+                row = offsets[r] + (f * bodies + b) * 7 * padded
+                px = buffer[row : row + padded]
+                py = buffer[row + padded : row + 2 * padded]
+                pz = buffer[row + 2 * padded : row + 3 * padded]
+                qw = buffer[row + 3 * padded : row + 4 * padded]
+                qi = buffer[row + 4 * padded : row + 5 * padded]
+                qj = buffer[row + 5 * padded : row + 6 * padded]
+                qk = buffer[row + 6 * padded : row + 7 * padded]
+                wp, wt = position_weights[f, b], angle_weights[f, b]
+                for s in range(exits):
+                    tx, ty, tz = trace[f, b, 0, s], trace[f, b, 1, s], trace[f, b, 2, s]
+                    tw, ti = trace[f, b, 3, s], trace[f, b, 4, s]
+                    tj, tk = trace[f, b, 5, s], trace[f, b, 6, s]
+                    total = errors[s]
+                    for m in range(np.uint64(low[s]), np.uint64(high[s])):
+                        total[m] += _difference(
+                            px[m], py[m], pz[m], qw[m], qi[m], qj[m], qk[m],
+                            tx, ty, tz, tw, ti, tj, tk, wp, wt,
+                        )  # fmt: skip
+            if not early_stop or f == frames - 1:
+                continue
+            # The whole error of the pair that leads so far bounds the error of the winner.
+            lead, lead_exit, lead_entry = np.float32(np.inf), 0, 0
+            for s in range(exits):
+                for m in range(low[s], min(high[s], count)):
+                    if errors[s, m] < lead:
+                        lead, lead_exit, lead_entry = errors[s, m], s, m
+            if lead_exit != tried_exit or lead_entry != tried_entry:
+                tried_exit, tried_entry = lead_exit, lead_entry
+                for g in range(f + 1, frames):
+                    for b in range(bodies):
+                        at = offsets[r] + (g * bodies + b) * 7 * padded + lead_entry
+                        lead += _difference(
+                            buffer[at], buffer[at + padded], buffer[at + 2 * padded],
+                            buffer[at + 3 * padded], buffer[at + 4 * padded],
+                            buffer[at + 5 * padded], buffer[at + 6 * padded],
+                            trace[g, b, 0, lead_exit], trace[g, b, 1, lead_exit],
+                            trace[g, b, 2, lead_exit], trace[g, b, 3, lead_exit],
+                            trace[g, b, 4, lead_exit], trace[g, b, 5, lead_exit],
+                            trace[g, b, 6, lead_exit], position_weights[g, b], angle_weights[g, b],
+                        )  # fmt: skip
+                bound = min(bound, lead * _SLACK + _FLOOR)
+            for s in range(exits):
+                first, last = low[s], min(high[s], count)
+                while first < last and errors[s, first] > bound:
+                    first += 1
+                while first < last and errors[s, last - 1] > bound:
+                    last -= 1
+                low[s] = first // lanes * lanes
+                high[s] = (last + lanes - 1) // lanes * lanes if first < last else low[s]
+        best = np.float32(np.inf)
+        best_exits[r], best_entries[r] = 0, 0
+        for s in range(exits):
+            for m in range(low[s], min(high[s], count)):
+                if errors[s, m] < best:
+                    best = errors[s, m]
+                    best_exits[r], best_entries[r] = s, m
+        best_errors[r] = best

@@ -1,0 +1,1 @@
+"""The result folder: file names, JSON, and which files dynresp may write and remove in it."""

@@ -1,0 +1,1 @@
+"""What every package needs: errors, files, paths, archives, array types, compiling, progress."""

@@ -1,0 +1,173 @@
+"""The picture of a few actions to choose from: their ways from above, and where they lead."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from dynresp.motion.character import default_character
+from dynresp.motion.rotations import FloatArray
+from dynresp.support.files import replacing
+from dynresp.view import body_shapes as shapes
+from dynresp.view import raster
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_INK = (0.14, 0.15, 0.18)
+_FAINT_INK = (0.48, 0.51, 0.55)
+_COLORS = ((0.16, 0.42, 0.70), (0.85, 0.40, 0.13), (0.20, 0.58, 0.40), (0.55, 0.34, 0.62))
+_DPI = 130
+_SIZE = (11.0, 6.2)  # [inch]
+_PLAN = (0.06, 0.09, 0.41, 0.82)
+# Of the plan: margin, arrow, radius of a number, and how far from an end numbers may be [inch].
+_MARGIN, _ARROW, _RADIUS = 0.45, 0.3, 0.14
+_REACHES = (0.25, 0.32, 0.4, 0.5, 0.65, 0.8)
+PIXEL_M = 0.006
+"""Size of a pixel of `pose_picture` [m]."""
+# The camera stands a little to the side of where a figure faces, and looks down a little [rad].
+_ASIDE, _DOWN = np.radians(30.0), np.radians(12.0)
+
+
+def write_options(
+    actions: Sequence[tuple[FloatArray, FloatArray]], words: Sequence[str], path: Path | str
+) -> None:
+    """Write the picture of actions as a PNG; the file is whole or not there.
+
+    Args:
+        actions: For each its way, (s, 4) x, y, z [m] and yaw [rad], and the pose (59,) that stands
+            for it.
+        words: What each is, in words.
+        path: The file; missing folders are made.
+
+    Raises:
+        DynrespError: The file cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    count = len(actions)
+    figure = Figure(_SIZE, dpi=_DPI, facecolor="white")
+    _draw_plan(figure.add_axes(_PLAN), [way for way, _ in actions])
+    for number, (_, pose) in enumerate(actions):
+        color = _COLORS[number % len(_COLORS)]
+        cell = figure.add_axes(_cell(number, count))
+        cell.set_axis_off()
+        picture = pose_picture(pose)
+        cell.imshow(picture, interpolation="nearest")
+        # A column of all figures' width, so that they are of one size.
+        middle = picture.shape[1] / 2
+        half = 0.75 / PIXEL_M
+        cell.set_xlim(middle - half, middle + half)
+        cell.set_ylim(picture.shape[0], picture.shape[0] - 2.0 / PIXEL_M)
+        cell.set_title(f"{number + 1}", color=color, fontsize=13, fontweight="bold", pad=2)
+        cell.text(0.5, -0.02, words[number].replace(", ", ",\n"), transform=cell.transAxes,
+                  ha="center", va="top", fontsize=7.5, color=_INK)  # fmt: skip
+    figure.text(0.06, 0.95, "Actions to choose from", fontsize=12, fontweight="bold", color=_INK)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _draw_plan(axes: Axes, ways: Sequence[FloatArray]) -> None:
+    """Ways from above, each with its number at a free place near its end."""
+    points = np.concatenate([way[:, :2] for way in ways])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = np.array(_PLAN[2:]) * _SIZE
+    # Metres an inch: all ways with a margin, and no less than a metre and a half across.
+    scale = max(float(((high - low) / (size - 2.0 * _MARGIN)).max()), 1.5 / float(size.min()))
+    corner = 0.5 * (low + high) - 0.5 * scale * size
+    axes.set_xlim(corner[0], corner[0] + scale * size[0])
+    axes.set_ylim(corner[1], corner[1] + scale * size[1])
+    axes.grid(color=(0.9, 0.91, 0.92), lw=0.6)
+    axes.tick_params(colors=_FAINT_INK, labelsize=7)
+    axes.set_xlabel("x [m]", fontsize=8, color=_FAINT_INK)
+    axes.set_ylabel("y [m]", fontsize=8, color=_FAINT_INK)
+    count, arrow = len(ways), _ARROW * scale
+    for number, way in enumerate(ways):
+        color = _COLORS[number % len(_COLORS)]
+        # Where they go the same way, the wider ones show beside those that lie on them.
+        axes.plot(*way[:, :2].T, color=color, lw=1.6 + 1.3 * (count - 1 - number))
+    start = ways[0][0]
+    _arrow(axes, start, 1.2 * arrow, _INK)
+    axes.plot(*start[:2], ls="", marker="o", ms=9, mfc="white", mec=_INK, mew=1.5)
+    ends = np.array([way[-1] for way in ways])
+    tips = ends[:, :2] + arrow * np.column_stack([np.cos(ends[:, 3]), np.sin(ends[:, 3])])
+    taken = np.concatenate([points, tips, 0.5 * (tips + ends[:, :2])])
+    badges = _free_places((ends[:, :2] - corner) / scale, (taken - corner) / scale, size)
+    for number, (end, badge) in enumerate(zip(ends, corner + scale * badges, strict=True)):
+        color = _COLORS[number % len(_COLORS)]
+        axes.plot(*np.column_stack([end[:2], badge]), color=color, lw=0.8)
+        _arrow(axes, end, arrow, color)
+        axes.plot(*end[:2], ls="", marker="o", ms=6, color=color, mec="white")
+        round_it = {"boxstyle": "circle,pad=0.22", "fc": "white", "ec": color, "lw": 1.4}
+        x, y = (float(v) for v in badge)
+        axes.text(x, y, f"{number + 1}", color=color, fontsize=10, fontweight="bold",
+                  ha="center", va="center", bbox=round_it, zorder=5)  # fmt: skip
+
+
+def _free_places(ends: FloatArray, taken: FloatArray, size: FloatArray) -> FloatArray:
+    """(k, 2) places for numbers near ends (k, 2), where nothing lies, on a sheet of a size [inch].
+
+    Args:
+        ends: What the numbers belong to.
+        taken: (p, 2) what they should not cover.
+        size: (2,) of the sheet, from 0.
+    """
+    angles = np.arange(24) * np.pi / 12.0
+    around = np.column_stack([np.cos(angles), np.sin(angles)])
+    places: list[FloatArray] = []
+    for end in ends:
+        tried = (end + np.array(_REACHES)[:, None, None] * around).reshape(-1, 2)
+        far = np.repeat(_REACHES, len(angles))
+        to_others = np.linalg.norm(tried[:, None] - taken, axis=2).min(axis=1)
+        cost = far + 10.0 * np.maximum(_RADIUS - to_others, 0.0)
+        if places:
+            to_badges = np.linalg.norm(tried[:, None] - np.array(places), axis=2).min(axis=1)
+            cost += 100.0 * np.maximum(2.2 * _RADIUS - to_badges, 0.0)
+        beside = np.maximum(_RADIUS - tried, tried + _RADIUS - size).max(axis=1)
+        cost += 100.0 * np.maximum(beside, 0.0)
+        places.append(tried[int(np.argmin(cost))])
+    return np.array(places)
+
+
+def _arrow(axes: Axes, at: FloatArray, length: float, color: shapes.Color) -> None:
+    """An arrow that shows where one faces at (4,) x, y, z [m] and yaw [rad]."""
+    x, y, _, yaw = (float(v) for v in at)
+    tip = (x + length * math.cos(yaw), y + length * math.sin(yaw))
+    style = {"arrowstyle": "-|>", "color": color, "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", tip, (x, y), arrowprops=style)
+
+
+def _cell(number: int, count: int) -> tuple[float, float, float, float]:
+    """Place of a figure: two columns on the right."""
+    rows = max(1, -(-count // 2))
+    row, column = divmod(number, 2)
+    height = 0.86 / rows
+    return (0.52 + 0.235 * column, 0.95 - (row + 1) * height + 0.09, 0.22, height - 0.13)
+
+
+def pose_picture(pose: FloatArray) -> npt.NDArray[np.uint8]:
+    """A person in a pose, seen from ahead and a little aside.
+
+    Args:
+        pose: (59,).
+
+    Returns:
+        (height, width, 4) red, green, blue, alpha; `PIXEL_M` a pixel, no larger than the person.
+    """
+    from dynresp.motion import rotations
+
+    character = default_character()
+    solids = shapes.character_solids(character)
+    states = character.kinematics(pose[None])
+    meshes = shapes.place(solids, states, 0, shapes.phase_colors(solids, None, 0.0))
+    yaw = float(rotations.yaw_of(pose[3:7])) + np.pi - _ASIDE
+    view = raster.Projection.looking(yaw, float(_DOWN))
+    layer = raster.draw(meshes, view, PIXEL_M)
+    canvas = raster.Canvas(layer.left, layer.top, layer.rgba.shape[1], layer.rgba.shape[0])
+    canvas.lay(layer, 0, 0, 1.0)
+    return canvas.picture()

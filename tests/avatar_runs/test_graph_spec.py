@@ -1,0 +1,88 @@
+from pathlib import Path
+
+import pytest
+
+from dynresp.avatar_runs.graph_spec import find_plan, plan_names, read_plan
+from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.support.errors import SpecError, UnknownNameError
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "plan.toml"
+    path.write_text(text)
+    return path
+
+
+SMALL = """
+[graph]
+name = "small"
+
+[[motion]]
+motion = "builtin:walk"
+"""
+
+
+def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
+    plan = read_plan(written(tmp_path, SMALL))
+    assert plan.graph.config() == GraphConfig()
+    assert plan.graph.world == "flat"
+    assert plan.motion[0].motion == "builtin:walk"
+
+
+def test_settings(tmp_path: Path) -> None:
+    said = SMALL.replace(
+        'name = "small"',
+        'name = "small"\nfps = 30\nmirrored = true\ncoordinates = "blocks"\nsigma = 0.2\n'
+        "contact_change = false\nblend_s = 0.2",
+    )
+    config = read_plan(written(tmp_path, said)).graph.config()
+    assert (config.fps, config.mirrored, config.sigma) == (30.0, True, 0.2)
+    assert config.coordinates is Coordinates.BLOCKS
+    assert config.keeps_local_maxima
+    assert config.blend_rate_s == 0.2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("name", "nam", r"graph\.nam is not a key of \[graph\] \(did you mean 'name'\?\)"),
+        ('name = "small"', "", "graph.name is missing; say in a few words"),
+        ("[[motion]]", "[motion]", r"motion: write \[\[motion\]\], with two brackets on each side"),
+        ("[graph]", "[[graph]]", r"graph: expected a table \[graph\], got \["),
+        ("[graph]", 'leave_out = "a.bvh"\n[graph]', "leave_out: expected a list in brackets, got"),
+        ("[graph]", "leave_out = [3]\n[graph]", "leave_out: expected text in quotes, got 3"),
+        ("[[motion]]", "[[motions]]", r"motions is not a key of the file"),
+        ('"builtin:walk"', '"builtin:walk"\nstart_s = -1', "motion.start_s: expected a number"),
+        ('"small"', '"small"\nfps = 0', "graph.fps: expected a number from 1 to 240 frames"),
+        ('"small"', '"small"\nworld = "moon"', "graph.world: expected 'flat', 'terrain'"),
+        ('"small"', '"small"\nblend_s = 0.1\nblend_rate_s = 0.2', "blend_rate_s must be at most"),
+        (
+            '"small"',
+            '"small"\nmirrored = true\ncoordinates = "fixed"',
+            "mirrored motion in fixed coordinates",
+        ),
+        ("[graph]", "[graph", "not valid TOML"),
+    ],
+)
+def test_mistakes_are_told(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(SpecError, match=said):
+        read_plan(written(tmp_path, SMALL.replace(old, new, 1)))
+
+
+def test_a_plan_without_motions_is_told(tmp_path: Path) -> None:
+    text = 'motion = []\n[graph]\nname = "small"\n'
+    with pytest.raises(SpecError, match=r"motion: expected at least 1 table \[\[motion\]\], got 0"):
+        read_plan(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("name", plan_names())
+def test_plans_that_come_with_dynresp_are_right(name: str) -> None:
+    plan = read_plan(find_plan(name))
+    assert plan.graph.name
+    assert plan.motion
+
+
+def test_plans_are_found_by_name_or_file() -> None:
+    assert find_plan("some/plan.toml") == Path("some/plan.toml")
+    with pytest.raises(UnknownNameError, match=r"unknown graph plan 'walkin'.*'walking'"):
+        find_plan("walkin")

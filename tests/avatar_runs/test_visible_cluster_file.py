@@ -1,0 +1,103 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynresp.avatar_runs.visible_cluster_file import FORMAT, Sight, load_actions, save_actions
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.character import Character
+from dynresp.support.errors import GraphFileError
+from tests.locomotion.vision.samples import acting_forest
+
+
+@pytest.fixture(scope="module")
+def graph() -> MotionGraph:
+    from dynresp.motion.character import default_character
+
+    return acting_forest(default_character()).graph
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def sight(
+    graph: MotionGraph, character: Character, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> Sight:
+    monkeypatch.setenv("DYNRESP_CACHE", str(cache))
+    return Sight.of(graph, character, 2, lambda *_: None, pytest.fail)
+
+
+def test_what_is_read_is_what_was_learnt(
+    sight: Sight, graph: MotionGraph, character: Character
+) -> None:
+    again = Sight.of(graph, character, 2, lambda *_: pytest.fail("made anew"), pytest.fail)
+    np.testing.assert_array_equal(again.table.rows, sight.table.rows)
+    a, b = again.forest.clusters, sight.forest.clusters
+    for name in ("labels", "log_probabilities", "examples"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    np.testing.assert_array_equal(a.mixture.means, b.mixture.means)
+    assert (a.curve, a.spacing, a.bounded) == (b.curve, b.spacing, b.bounded)
+    seen = sight.table.rows[:20, 3]
+    np.testing.assert_array_equal(
+        again.recogniser.probabilities(seen), sight.recogniser.probabilities(seen)
+    )
+
+
+def test_another_bound_is_another_file(
+    sight: Sight, graph: MotionGraph, character: Character, cache: Path
+) -> None:
+    stages = []
+    Sight.of(graph, character, 3, lambda stage, *_: stages.append(stage), pytest.fail)
+    assert set(stages) == {"telling actions apart"}
+    assert len(list((cache / "sight").glob("actions-*.npz"))) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("identity", np.array("another"), "another graph"),
+        ("labels", np.full(180, 7, dtype="<i4"), "do not fit together"),
+        ("labels", np.zeros(179, dtype="<i4"), "do not fit together"),
+        ("first_weights", np.zeros((3, 128)), "do not fit together"),
+        ("means", np.zeros((2, 39)), "do not fit together"),
+        ("last_biases", np.full(2, np.nan), "no sense"),
+        ("last_biases", np.full(2, -np.inf), "no sense"),
+        ("last_biases", np.array([0.0, np.inf]), "no sense"),
+        ("variances", np.zeros(2), "no sense"),
+        ("weights", np.array([1.5, -0.5]), "no sense"),
+        ("spacing", np.array(0), "no sense"),
+        ("curve", np.full((1, 3), np.inf), "no sense"),
+        ("first_biases", np.full(128, np.inf), "no sense"),
+        ("last_weights", np.full((128, 2), -np.inf), "no sense"),
+        ("last_weights", np.full((128, 2), 1e300), "no sense"),
+        ("log_probabilities", np.full((180, 2), np.inf, dtype="<f4"), "no sense"),
+        ("log_probabilities", np.full((180, 2), -np.inf, dtype="<f4"), "no sense"),
+        ("log_probabilities", np.full((180, 2), np.nan, dtype="<f4"), "no sense"),
+        ("examples", np.array([20, 999], dtype="<i4"), "not there"),
+        ("ages", np.full(7, -1, dtype="<i4"), "not there"),
+    ],
+)
+def test_files_that_make_no_sense(
+    sight: Sight, graph: MotionGraph, tmp_path: Path, name: str, value: np.ndarray, said: str
+) -> None:
+    path = tmp_path / "actions.npz"
+    save_actions(path, "mine", sight.forest.clusters, sight.recogniser)
+    assert len(load_actions(path, "mine", graph, sight.table)[0]) == 2
+    with np.load(path, allow_pickle=False) as archive:
+        arrays = {key: archive[key] for key in archive.files if key != "format_version"}
+    FORMAT.write(path, {**arrays, name: value})
+    with pytest.raises(GraphFileError, match=said):
+        load_actions(path, "mine", graph, sight.table)
+
+
+def test_infinite_weights_make_no_sense(sight: Sight, graph: MotionGraph, tmp_path: Path) -> None:
+    path = tmp_path / "actions.npz"
+    first, last = sight.recogniser.weights
+    wrong = replace(sight.recogniser, weights=(np.full_like(first, np.inf), last))
+    save_actions(path, "mine", sight.forest.clusters, wrong)
+    with pytest.raises(GraphFileError, match="no sense"):
+        load_actions(path, "mine", graph, sight.table)

@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from dynresp.bench.filming import Filming, film, write_video
+from dynresp.locomotion.vision.observation import Watcher
+from dynresp.locomotion.vision.video_control import VideoControl
+from dynresp.locomotion.vision.video_following import follow
+from dynresp.locomotion.vision.video_reader import Video
+from dynresp.motion.motion import Motion
+from dynresp.support.errors import UsageError
+from tests.locomotion.vision.samples import STEPPING, WAVING, stepping, waving
+from tests.locomotion.vision.video_samples import person
+
+
+def acted(who: str, seed: int, folder, fps: float = 30.0) -> list[np.ndarray]:
+    """Four seconds of steps and four of waving, another body's and another pace."""
+    somebody = person(who, folder)
+    parts = [act(somebody, round(4 * fps), fps, 0.85) for act in (stepping, waving)]
+    filming = Filming(seed, fps=fps, yaw=2.0)
+    return list(film(Motion(np.concatenate(parts), fps), somebody, filming))
+
+
+def test_an_avatar_follows_a_stranger_in_a_file(forest, table, recogniser, tmp_path) -> None:
+    path = tmp_path / "video.mp4"
+    write_video(path, iter(acted("hys", 4, tmp_path)), 30.0)
+    control = VideoControl(forest, table, recogniser)
+    with Video(path) as video:
+        steps = list(follow(video, video.fps, control, 130, np.random.default_rng(0)))
+    times = [step.time_s for step in steps]
+    np.testing.assert_allclose(times, 0.1 * np.arange(1, len(times) + 1), atol=1e-6)
+    assert len(times) == pytest.approx(90, abs=1)
+    # The first second shows the room alone.
+    assert all(step.told is None for step in steps if step.time_s < 1.0)
+    assert all(step.told == STEPPING for step in steps if 2.0 < step.time_s < 5.0)
+    assert all(step.told == WAVING for step in steps if step.time_s > 6.0)
+    labels = forest.clusters.labels
+    assert all(labels[s.frames[-1]] == WAVING for s in steps if s.time_s > 7.0 and len(s.frames))
+    played = np.concatenate([[130], *(step.frames for step in steps)])
+    graph = forest.graph
+    ways = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
+    assert set(zip(played[:-1].tolist(), played[1:].tolist(), strict=True)) <= ways
+    assert len(played) - 1 == int(times[-1] * 15 + 1e-9)
+
+
+@pytest.mark.parametrize("fps", [10.0, 15.0, 24.0, 60.0])
+def test_there_is_a_row_for_every_frame_of_the_database(table, tmp_path, fps) -> None:
+    somebody = person("mmk", tmp_path)
+    motion = Motion(stepping(somebody, round(2 * fps), fps), fps)
+    watcher = Watcher(table, fps)
+    rows = [row for p in film(motion, somebody, Filming(8, fps=fps)) for row in watcher.see(p)]
+    assert len(rows) == pytest.approx(30, abs=2)
+    assert np.isfinite(rows).all()
+
+
+def test_wrong_requests_are_refused(forest, table, recogniser) -> None:
+    control = VideoControl(forest, table, recogniser)
+    with pytest.raises(UsageError, match="component"):
+        next(follow([], 30.0, control, 999, np.random.default_rng(0)))
+    with pytest.raises(UsageError, match="fps"):
+        next(follow([], 0.0, control, 20, np.random.default_rng(0)))

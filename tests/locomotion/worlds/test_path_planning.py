@@ -1,0 +1,127 @@
+import math
+
+import numpy as np
+import pytest
+
+from dynresp.locomotion.worlds import path_planning as planning
+from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
+from dynresp.locomotion.worlds.obstacles import Obstacle, World
+from dynresp.locomotion.worlds.path_planning import PlanningConfig, fit_path, plan_path
+from dynresp.locomotion.worlds.paths import resampled
+from dynresp.support.errors import DynrespError, UsageError
+
+OPEN = World((-1.0, -3.0, 9.0, 3.0))
+WALL = World((-1.0, -3.0, 9.0, 3.0), (Obstacle((4.0, -1.0), (0.1, 2.0)),))
+
+
+def length(path: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def test_in_the_open_it_is_straight() -> None:
+    path = plan_path(OPEN, (0.0, 0.0), (8.0, 1.0))
+    np.testing.assert_allclose(path[[0, -1]], [(0.0, 0.0), (8.0, 1.0)])
+    assert length(path) < 1.03 * math.hypot(8.0, 1.0)
+    assert np.hypot(*np.diff(path, axis=0).T).max() < 0.11
+
+
+def test_it_goes_around_with_room_to_spare() -> None:
+    path = plan_path(WALL, (0.0, 0.0), (8.0, 0.0))
+    away = WALL.distances(path)
+    assert away.min() > 0.45
+    assert length(path) < 9.5
+
+
+def test_a_narrow_gap_is_taken_only_where_it_saves_a_lot() -> None:
+    boxes = (Obstacle((4.0, -1.85), (0.1, 1.55)), Obstacle((4.0, 1.3), (0.1, 1.0)))
+    world = World((-1.0, -3.4, 9.0, 3.4), boxes)
+    # The gap between y = -0.3 and y = 0.3, or around by y = 2.8.
+    short, patient = (
+        plan_path(world, (0.0, 0.0), (8.0, 0.0), PlanningConfig(dislike=d)) for d in (1.0, 100.0)
+    )
+    assert np.abs(short[:, 1]).max() < 0.5
+    assert patient[:, 1].max() > 2.3
+    closed = plan_path(world, (0.0, 0.0), (8.0, 0.0), blocked=[(4.0, 0.0, 0.3)])
+    assert closed[:, 1].max() > 2.3
+
+
+def test_a_sketch_that_needs_no_help_is_kept() -> None:
+    angle = np.linspace(0.0, 3.0 * math.pi, 90)
+    # One and a half turns: it crosses its own beginning.
+    sketch = np.stack([4.0 + 1.5 * np.cos(angle), 1.5 * np.sin(angle)], axis=1)
+    path = fit_path(OPEN, sketch)
+    assert length(path) == pytest.approx(length(sketch), rel=0.06)
+    away = np.abs(np.hypot(path[:, 0] - 4.0, path[:, 1]) - 1.5)
+    assert away.max() < 0.15
+    np.testing.assert_allclose(path[[0, -1]], sketch[[0, -1]], atol=1e-9)
+
+
+def test_a_sketch_that_cuts_a_wall_goes_around_its_end() -> None:
+    path = fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])
+    assert WALL.distances(path).min() > 0.2
+    # Beyond where a way around is first looked for.
+    path = fit_path(WALL, [(0.0, -1.5), (8.0, -1.5)])
+    assert WALL.distances(path).min() > 0.2
+    assert path[:, 1].max() > 1.2
+
+
+def test_walls_between_a_sketch_and_its_way_do_not_lead_it_astray() -> None:
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        maze = random_maze(rng, MazeConfig(loops=0.0, cell_m=1.4))
+        corners = maze.solution + rng.normal(0.0, 0.3, maze.solution.shape)
+        path = fit_path(maze.world, corners)
+        assert maze.world.distances(path).min() > 0.19
+        assert length(path) < 1.25 * length(maze.solution)
+        assert np.hypot(*(path[-1] - maze.solution[-1])) < 1.0
+
+
+def test_there_may_be_no_way() -> None:
+    boxes = (Obstacle((4.0, 0.0), (0.1, 3.0)),)
+    world = World((-1.0, -3.0, 9.0, 3.0), boxes)
+    with pytest.raises(DynrespError, match=r"no way from \(0.00, 0.00\) to \(8.00, 0.00\)"):
+        plan_path(world, (0.0, 0.0), (8.0, 0.0))
+    with pytest.raises(DynrespError, match="no way"):
+        fit_path(world, [(0.0, 0.0), (8.0, 0.0)])
+    with pytest.raises(DynrespError, match=r"the goal .* is not within 2 m"):
+        plan_path(world, (0.0, 0.0), (18.0, 0.0))
+
+
+def test_grids_that_would_be_too_large_are_refused() -> None:
+    world = World((-100.0, -100.0, 100.0, 100.0))
+    fine = PlanningConfig(resolution_m=0.01)
+    with pytest.raises(UsageError, match=r"200 x 200 m in cells of 0.01 m"):
+        plan_path(world, (0.0, 0.0), (8.0, 0.0), fine)
+    discs = np.zeros((20_000, 3))
+    with pytest.raises(UsageError, match="20000 discs in 37500 cells"):
+        plan_path(WALL, (0.0, 0.0), (8.0, 0.0), PlanningConfig(resolution_m=0.04), discs)
+
+
+def test_what_is_looked_at_around_a_sketch_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Enough for a first look; the second is four times as wide.
+    monkeypatch.setattr(planning, "_MOST_STATES", 20_000)
+    assert WALL.distances(fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])).min() > 0.2
+    with pytest.raises(UsageError, match=r"8\.0 m long is too long to look for ways 4 m around"):
+        fit_path(WALL, [(0.0, -1.5), (8.0, -1.5)])
+    monkeypatch.setattr(planning, "_MOST_STATES", 2_000)
+    with pytest.raises(UsageError, match=r"too long to look for ways 1 m around .* reach_m"):
+        fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])
+
+
+def test_points_along_a_path() -> None:
+    path = resampled([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (1.0, 2.0)], 0.5)
+    np.testing.assert_allclose(
+        path, [(0, 0), (0.5, 0), (1, 0), (1, 0.5), (1, 1), (1, 1.5), (1, 2)], atol=1e-12
+    )
+    np.testing.assert_array_equal(resampled([(1.0, 2.0), (1.0, 2.0)], 0.1), [(1.0, 2.0)])
+    with pytest.raises(UsageError, match=r"points \(k, 2\), got \(0,\)"):
+        resampled([], 0.1)
+    with pytest.raises(UsageError, match="finite"):
+        resampled([(0.0, math.inf)], 0.1)
+
+
+def test_what_makes_no_sense() -> None:
+    with pytest.raises(UsageError, match="narrow_m < comfort_m"):
+        PlanningConfig(narrow_m=0.5, comfort_m=0.4)
+    with pytest.raises(UsageError, match="pull"):
+        PlanningConfig(pull=-1.0)
