@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from dynresp.results.result_folder import (
 )
 from dynresp.results.result_json import versions, write_json
 from dynresp.support.errors import MotionError, SpecError
-from dynresp.support.progress import Progress
+from dynresp.support.progress import Progress, no_progress
 
 # Hits are answered in bundles of this size, so that memory does not grow with their number.
 _BUNDLE = 100
@@ -203,37 +203,60 @@ def _time(hit: Hit) -> float:
 
 
 def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dict[str, Any]:
-    """Answer all hits of an experiment and write what came of them.
+    """Answer all hits of an experiment and write the result folder.
 
     Args:
         run: The experiment, loaded.
         out: Folder to write to; made if it is missing.
-        progress: Told the stage, how many are done, and of how many.
+        progress: Called with the stage, how many are done, and of how many.
 
     Returns:
-        The content of `result.json`; of a batch, of `summary.json`. What an earlier run left in
-        the folder is removed, so that all of dynresp's files there belong together.
+        See `write_answers`.
 
     Raises:
         DynrespError: `result.json` or `summary.json` cannot be written.
     """
-    tell = progress or (lambda stage, done, of: None)
+    progress = progress or no_progress
+    count = run.experiment.experiment.count
+    return write_answers(run, run.answers(range(count), progress), out, progress)
+
+
+def write_answers(
+    run: Run, answers: Iterable[Answer], out: Path, progress: Progress
+) -> dict[str, Any]:
+    """Write the result folder of an experiment.
+
+    What an earlier run left in the folder is removed, so that all of dynresp's files there belong
+    together.
+
+    Args:
+        run: The experiment, loaded.
+        answers: All its answers, in order. Those that are not written in full are not kept.
+        out: Folder to write to; made if it is missing.
+        progress: Called with the stage, how many are done, and of how many.
+
+    Returns:
+        The content of `result.json`; of a batch, of `summary.json`.
+
+    Raises:
+        DynrespError: `result.json` or `summary.json` cannot be written.
+    """
     table = run.experiment.experiment
     about = run.about()
 
     def write(answer: Answer, where: Path, title: str) -> dict[str, Any]:
         return write_response(
             where, title, answer.hit, answer.response, answer.quality, about,
-            run.experiment.output, run.character, run.config, tell,
+            run.experiment.output, run.character, run.config, progress,
         )  # fmt: skip
 
     if table.count == 1:
-        (answer,) = run.answers(range(1), tell)
+        (answer,) = answers
         return write(answer, out, table.name)
 
     shown = chosen_hits(run.seed, table.count, table.show)
     rows, picked = [], []
-    for answer in run.answers(range(table.count), tell):
+    for answer in answers:
         rows.append(batch.row(answer.hit, answer.response, answer.quality))
         if answer.hit.number in shown:
             picked.append(answer)

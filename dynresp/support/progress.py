@@ -1,4 +1,4 @@
-"""Who is told how far something that takes long has come."""
+"""How far something that takes long has come."""
 
 from __future__ import annotations
 
@@ -6,4 +6,8 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 Progress: TypeAlias = Callable[[str, int, int], None]
-"""Told the stage, how many are done, and of how many."""
+"""Called with the stage, how many are done, and of how many."""
+
+
+def no_progress(stage: str, done: int, of: int) -> None:
+    """Show nothing."""
