@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from dynresp.support.errors import MissingMotionDataError
-
 if TYPE_CHECKING:
     from dynresp.motion.load import LoadOptions
     from dynresp.motion.motion import Motion
@@ -90,19 +88,6 @@ def load(name: str, motions: Path | None, told: LoadOptions) -> tuple[Motion, Pa
         MissingMotionDataError: It is nowhere.
         DynrespError: It cannot be read.
     """
-    from dynresp.experiments.named_motions import find_motion
-    from dynresp.motion.builtin import load_builtin
-    from dynresp.motion.load import load_motion
-    from dynresp.motion.sources.motion_folders import motion_folders
+    from dynresp.experiments.named_motions import load_named_motion
 
-    folders = motion_folders(motions)
-    found = find_motion(name, folders, Path())
-    if found is None:
-        looked = ", ".join(str(folder) for folder in [Path().absolute(), *folders])
-        raise MissingMotionDataError(
-            f"{name}: no such motion in {looked}. `dynresp motions list` shows what is there; "
-            "--motions names another folder."
-        )
-    if isinstance(found, str):
-        return load_builtin(found), None
-    return load_motion(found, options=told), found
+    return load_named_motion(name, motions, options=told)

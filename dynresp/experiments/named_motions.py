@@ -21,7 +21,7 @@ from dynresp.motion.reactions.reaction_library import (
     load_library,
 )
 from dynresp.motion.sources.catalogue import load_licences, load_sources
-from dynresp.motion.sources.motion_folders import find_motion_file
+from dynresp.motion.sources.motion_folders import find_motion_file, motion_folders
 from dynresp.support.errors import (
     MissingMotionDataError,
     MotionFileError,
@@ -115,6 +115,40 @@ def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str 
     if given.is_absolute() or ".." in given.parts:
         raise MotionFileError(f"{name}: no such file; expected a motion file")
     return find_motion_file(given.as_posix(), folders)
+
+
+def load_named_motion(
+    name: str,
+    motions: Path | str | None = None,
+    character: Character | None = None,
+    options: LoadOptions | None = None,
+) -> tuple[Motion, Path | None]:
+    """Find a motion by its name and load it.
+
+    Args:
+        name: A file, a path inside a motions folder, or "builtin:walk" and the like.
+        motions: Motions folder, in place of `DYNRESP_MOTIONS` and of what was fetched.
+        character: The character, by default the product's.
+        options: How to read the file.
+
+    Returns:
+        The motion at its own frame rate, and its file; None for a built-in motion.
+
+    Raises:
+        MissingMotionDataError: It is not on this machine.
+        DynrespError: It cannot be read.
+    """
+    folders = motion_folders(None if motions is None else Path(motions))
+    found = find_motion(name, folders, Path())
+    if found is None:
+        looked = ", ".join(str(folder) for folder in [Path().absolute(), *folders])
+        raise MissingMotionDataError(
+            f"{name}: no such motion in {looked}. `dynresp motions list` shows what is there; "
+            "--motions or DYNRESP_MOTIONS names another folder."
+        )
+    if isinstance(found, str):
+        return load_builtin(found, character), None
+    return load_motion(found, character, options), found
 
 
 def load_cut(cut: MotionCut, found: Path | str, key: str, character: Character) -> Motion:
