@@ -25,6 +25,7 @@ from dynresp.motion.character import Character
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
+from dynresp.physics.impacts import Impact
 from dynresp.response.runtime.dynamic_responder import DynamicResponder, Phase
 from dynresp.support.arrays import IntArray
 from dynresp.support.errors import UsageError
@@ -192,6 +193,17 @@ class Avatar:
             self.doing = Doing.HIT
         elif self._stream is not None:
             self._feed(self._stream)
+
+    def hit(self, impact: Impact) -> None:
+        """Let something hit the avatar.
+
+        Args:
+            impact: What hits it; its time counts from now.
+
+        Raises:
+            SpecError: See `DynamicResponder.hit`.
+        """
+        self.responder.hit(impact)
 
     def steer(self, planner: Planner) -> None:
         """Go where another planner says, as soon as possible: from the graph's next frame on.

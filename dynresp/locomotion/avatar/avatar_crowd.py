@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Planner
+from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Planner, Wanderer
 from dynresp.locomotion.avatar.graph_entry import ReentryPlanner
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import check_in_component
-from dynresp.motion.character import Character
+from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.rotations import FloatArray
@@ -90,6 +91,27 @@ class AvatarCrowd:
                 self.crowd.responders, planners, starts, strict=True
             )
         )
+
+    @classmethod
+    def wandering(
+        cls, graph: MotionGraph, library: ReactionLibrary, count: int = 1, seed: int = 0
+    ) -> AvatarCrowd:
+        """Avatars that start anywhere in a graph, over the origin, and walk at random.
+
+        Args:
+            graph: Where they walk; a graph of the product's own character.
+            library: Its reactions, at 30 frames a second.
+            count: How many.
+            seed: Seed of their starts and of their walks.
+
+        Raises:
+            UsageError: The graph was made of another character's motions.
+            MotionError: There is no avatar, or the library has another frame rate.
+        """
+        rng = np.random.default_rng(seed)
+        starts = [(int(rng.choice(graph.frames)), placement.IDENTITY) for _ in range(count)]
+        planners = [Wanderer(graph, np.random.default_rng([seed, k + 1])) for k in range(count)]
+        return cls(default_character(), library, graph, planners, starts)
 
     def advance(self) -> FloatArray:
         """Go on by one frame.
