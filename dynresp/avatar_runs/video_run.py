@@ -23,6 +23,7 @@ from dynresp.locomotion.vision.video_following import Followed, follow
 from dynresp.motion.character import Character
 from dynresp.results.result_folder import WATCHING
 from dynresp.support.errors import DynrespError, MotionFileError, UsageError
+from dynresp.support.extras import require
 from dynresp.support.progress import Progress
 from dynresp.view.video_control_view import Seen, TimeLine, Watched, letter, write_watched
 
@@ -242,6 +243,7 @@ class _Reel:
 
     def keep(self, step: Followed) -> None:
         """Keep the moment of a choice, where somebody is seen and it is its turn."""
+        require("cv2")
         import cv2
 
         self._steps += 1

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from dynresp.locomotion.vision.segmentation import Picture
 from dynresp.locomotion.vision.video_reader import Video
-from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.errors import UsageError
+from dynresp.support.extras import require
 
 _CAMERA = re.compile(r"camera(?::(\d{1,3}))?")
 
@@ -30,15 +31,9 @@ def open_source(text: str) -> tuple[Video, bool]:
     Raises:
         UsageError: It is a camera of no number.
         MotionFileError: It cannot be opened.
-        DynrespError: OpenCV is not there.
+        MissingExtraError: OpenCV is not installed.
     """
-    try:
-        import cv2  # noqa: F401
-    except ImportError as error:
-        raise DynrespError(
-            f"OpenCV, which reads videos, cannot be loaded ({error}); install it by "
-            "`pip install opencv-python-headless`"
-        ) from None
+    require("cv2")
     # FFmpeg would write to standard error as well what the errors here say.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     camera = _CAMERA.fullmatch(text)

@@ -16,6 +16,7 @@ from dynresp.bench.measure import BenchResult, Contender, median_seconds
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
 from dynresp.support.errors import DynrespError
+from dynresp.support.extras import require
 
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
@@ -128,6 +129,7 @@ def synthetic(seed: int) -> Subject:
     Args:
         seed: Seed of the problem.
     """
+    require("sklearn")
     from sklearn.decomposition import PCA
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

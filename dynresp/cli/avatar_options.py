@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dynresp.cli.progress_bar import progress
+from dynresp.cli.run import exit_if_failed, report_unwritten
 
 if TYPE_CHECKING:
     from dynresp.avatar_runs.avatar_run import Outing
@@ -47,22 +48,18 @@ def finish(
     """
     from dynresp.avatar_runs.avatar_run import write_outing
     from dynresp.motion.character import default_character
-    from dynresp.results.result_folder import WRITTEN, is_failure
     from dynresp.results.result_json import to_json
 
     with progress() as tell:
         content = write_outing(out, graph, outing, default_character(), tell, video)
-    for name, what in content["files"].items():
-        if what != WRITTEN:
-            typer.echo(f"dynresp: {name} {what}", err=True)
+    report_unwritten(content["files"])
     typer.echo(
         to_json({**content, **(more or {})}) if as_json else tell_outing(content, out, lines)
     )
     if not outing.arrived:
         typer.echo("dynresp: it did not arrive; result.json says how far it came", err=True)
         raise typer.Exit(1)
-    if any(is_failure(what) for what in content["files"].values()):
-        raise typer.Exit(1)
+    exit_if_failed(content["files"])
 
 
 def tell_outing(content: dict[str, Any], out: Path, more: Sequence[str] = ()) -> str:

@@ -32,9 +32,11 @@ def evaluate(
 
     Of the dataset that it was trained on, only the samples held out count; of any other, all.
     """
-    from dynresp.cli.run import check_folder
+    from dynresp.cli.run import check_folder, exit_if_failed, report_unwritten
     from dynresp.cli.train import with_elapsed
+    from dynresp.support.extras import require
 
+    require("pyarrow", "sklearn")
     if out is not None:
         check_folder(out)
     with progress() as told:
@@ -43,26 +45,31 @@ def evaluate(
         from dynresp.datasets.dataset_reader import load_dataset
         from dynresp.learning import evaluation as judging
         from dynresp.response.prediction.classifier_file import load_classifier
+        from dynresp.results.result_folder import WRITTEN
         from dynresp.results.result_json import to_json
 
+        files: dict[str, str] = {}
         content = judging.evaluate(load_classifier(model), load_dataset(dataset), tell)
         if out is not None:
             tell("writing", 0, 1)
             from dynresp.learning.evaluation_files import write_report
 
-            written = write_report(out, content)
+            files = write_report(out, content)
     if content["differing_settings"]:
         typer.echo(
             "dynresp: the dataset was made under other settings than the classifier was trained "
             f"for: {', '.join(content['differing_settings'])}",
             err=True,
         )
+    report_unwritten(files)
     if as_json:
         typer.echo(to_json(content))
-        return
-    typer.echo(_told(content))
-    if out is not None:
-        typer.echo(f"  written    {out}: {', '.join(written)}")
+    else:
+        typer.echo(_told(content))
+        if out is not None:
+            written = [name for name, what in files.items() if what == WRITTEN]
+            typer.echo(f"  written    {out}: {', '.join(written)}")
+    exit_if_failed(files)
 
 
 def _told(content: dict[str, Any]) -> str:

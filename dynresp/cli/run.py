@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -63,7 +64,6 @@ def answer(
     """
     from dynresp.cli.result_text import tell_choosing, tell_result, tell_substitutes, tell_summary
     from dynresp.experiments.experiment_reader import read_experiment
-    from dynresp.results.result_folder import WRITTEN, is_failure
     from dynresp.results.result_json import to_json
 
     file = read_experiment(experiment)
@@ -77,9 +77,7 @@ def answer(
     for remark in (tell_substitutes(content), tell_choosing(content)):
         if remark:
             typer.echo(f"dynresp: {remark}", err=True)
-    for name, what in content["files"].items():
-        if what != WRITTEN:
-            typer.echo(f"dynresp: {name} {what}", err=True)
+    report_unwritten(content["files"])
     if as_json:
         typer.echo(to_json(content))
     elif "outcomes" in content:
@@ -89,7 +87,37 @@ def answer(
     if _all_diverged(content):
         typer.echo("dynresp: the simulation diverged; see result.json", err=True)
         raise typer.Exit(1)
-    if any(is_failure(what) for what in content["files"].values()):
+    exit_if_failed(content["files"])
+
+
+def report_unwritten(files: Mapping[str, str]) -> None:
+    """Say which files were not written; the same reason is said once.
+
+    Args:
+        files: What `result_folder.attempt` says of each file.
+    """
+    from dynresp.results.result_folder import WRITTEN
+
+    reasons: dict[str, list[str]] = {}
+    for name, what in files.items():
+        if what != WRITTEN:
+            reasons.setdefault(what, []).append(name)
+    for what, names in reasons.items():
+        typer.echo(f"dynresp: {', '.join(names)} {what}", err=True)
+
+
+def exit_if_failed(files: Mapping[str, str]) -> None:
+    """Exit with code 1 where a file failed; one that this machine cannot make has not.
+
+    Args:
+        files: What `result_folder.attempt` says of each file.
+
+    Raises:
+        typer.Exit: With code 1, where one failed.
+    """
+    from dynresp.results.result_folder import is_failure
+
+    if any(is_failure(what) for what in files.values()):
         raise typer.Exit(1)
 
 

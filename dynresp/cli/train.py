@@ -89,7 +89,9 @@ def train(
     """Train a classifier to choose as the oracle chose, and judge it by samples held out."""
     from dynresp.cli.run import check_folder
     from dynresp.support.errors import UsageError
+    from dynresp.support.extras import require
 
+    require("pyarrow", "sklearn", "skops")
     if out is not None and (out.suffix != ".skops" or out.is_dir()):
         raise UsageError(f"--out: {str(out)!r}: expected a file whose name ends in .skops")
     if out is not None:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from dynresp.datasets.sample_worker import Job, Workshop, load
 from dynresp.datasets.shards import Place
 from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.extras import require
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -52,7 +53,8 @@ def make_there(
         A shard and its Parquet file, in whatever order they are done.
 
     Raises:
-        UsageError: Dask is not installed, the address is none, or certificates are missing.
+        MissingExtraError: Dask is not installed.
+        UsageError: The address is none, or certificates are missing.
         DynrespError: The scheduler cannot be reached or is gone; a worker could not do it; or too
             many workers died of one shard.
     """
@@ -78,16 +80,13 @@ def connection_security(address: str) -> Any:
         Dask's `distributed.Security`.
 
     Raises:
-        UsageError: Dask is not installed, the address is none, or it asks for TLS and the
+        MissingExtraError: Dask is not installed.
+        UsageError: The address is none, or it asks for TLS and the
             configuration has no certificates for that, or names files that cannot be read.
     """
-    try:
-        from distributed.security import Security
-    except ImportError as error:
-        raise UsageError(
-            f"--scheduler needs Dask, which cannot be imported here ({error}); install it with "
-            "pip install 'dynresp[cluster]'"
-        ) from None
+    require("distributed")
+    from distributed.security import Security
+
     if not _ADDRESS.fullmatch(address):
         raise UsageError(
             f"--scheduler: expected an address such as tcp://host:8786 or tls://host:8786, got "

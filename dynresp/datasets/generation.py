@@ -37,6 +37,7 @@ from dynresp.datasets.shards import (
     stated,
 )
 from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.support.paths import expanded
 from dynresp.support.progress import Progress
@@ -116,9 +117,11 @@ def generate(
     Raises:
         UsageError: The folder holds another dataset, more samples than asked for, or cannot be
             written; or the scheduler's address or certificates are wrong.
+        MissingExtraError: PyArrow is not installed.
         DynrespError: It could not be done. What has been made stays, and is gone on with.
     """
     tell = tell or (lambda stage, done, of: None)
+    require("pyarrow")
     if scheduler is not None:
         from dynresp.datasets.dask_workers import connection_security
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from dynresp.datasets.dataset_spec import KINDS
 from dynresp.datasets.sample_draws import Sample
 from dynresp.motion.character import Character
+from dynresp.support.extras import require
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -95,6 +96,7 @@ def columns(features: int, classes: int) -> tuple[Column, ...]:
 
 def arrow_schema(layout: Sequence[Column]) -> pa.Schema:
     """The same for Arrow: a cell of several numbers is a list of fixed size; nothing is null."""
+    require("pyarrow")
     import pyarrow as pa
 
     fields = []

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from dynresp.datasets.shard_schema import Column, Columns, arrow_schema
 from dynresp.support.errors import DynrespError
+from dynresp.support.extras import require
 
 _KEY = b"dynresp"
 _NAME = re.compile(r"shard-(\d{5,})\.parquet")
@@ -91,6 +92,7 @@ def stated(folder: Path) -> list[Place]:
     This is read from their ends alone, without a look at the samples. A shard that is damaged
     there is left out.
     """
+    require("pyarrow")
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -116,6 +118,7 @@ def encode(columns: Columns, layout: Sequence[Column], place: Place) -> bytes:
         layout: Its columns.
         place: Which shard it is.
     """
+    require("pyarrow")
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -160,6 +163,7 @@ def decode(data: bytes, layout: Sequence[Column], place: Place, source: str) -> 
         ForeignShardError: It is a shard of another dataset.
         ShardError: It is damaged, or another shard than it shall be.
     """
+    require("pyarrow")
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynresp.learning.choice_metrics import Choices
 from dynresp.learning.labelled_samples import Labelled
+from dynresp.support.extras import require
 
 NEIGHBOURS = 7
 """How many vote."""
@@ -31,6 +32,7 @@ def nearest_neighbours(
     Returns:
         (n, 2) classes.
     """
+    require("sklearn")
     from sklearn.neighbors import NearestNeighbors
 
     mean = learning.features.mean(axis=0, dtype=np.float64)

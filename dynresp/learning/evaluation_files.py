@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dynresp.results.result_folder import WRITTEN, attempt
 from dynresp.results.result_json import write_json
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ _INK = "#23272e"
 _MOST_NAMED, _MOST_NUMBERED = 80, 40
 
 
-def write_report(folder: Path, content: dict[str, Any]) -> list[str]:
+def write_report(folder: Path, content: dict[str, Any]) -> dict[str, str]:
     """Write an evaluation.
 
     Args:
@@ -30,15 +32,18 @@ def write_report(folder: Path, content: dict[str, Any]) -> list[str]:
         content: What `evaluate` gives.
 
     Returns:
-        Names of the files.
+        For each file what came of it, as `result_folder.attempt` says it.
 
     Raises:
-        DynrespError: A file cannot be written.
+        DynrespError: `evaluation.json` or `per_strategy.csv` cannot be written.
     """
     write_json(content, folder / EVALUATION)
     _write_table(folder / TABLE, content["per_strategy"])
-    write_confusion(folder / PICTURE, content)
-    return [EVALUATION, TABLE, PICTURE]
+    return {
+        EVALUATION: WRITTEN,
+        TABLE: WRITTEN,
+        PICTURE: attempt(lambda path: write_confusion(path, content), folder / PICTURE),
+    }
 
 
 def _write_table(path: Path, per_strategy: dict[str, dict[str, Any]]) -> None:
@@ -59,6 +64,7 @@ def write_confusion(path: Path, content: dict[str, Any]) -> None:
     Raises:
         DynrespError: The file cannot be written.
     """
+    require("matplotlib")
     from matplotlib.figure import Figure
 
     counts = np.array(content["confusion"]["counts"])

@@ -22,6 +22,7 @@ from dynresp.learning.labelled_samples import Labelled
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
 from dynresp.support.errors import UsageError
+from dynresp.support.extras import require
 from dynresp.support.progress import Progress
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def fit_pipeline(
 
 def _prepare(features: npt.ArrayLike, components: int) -> tuple[Pipeline, FloatArray]:
     """Scaler and principal components, and the samples in terms of these."""
+    require("sklearn")
     from sklearn.decomposition import PCA
     from sklearn.pipeline import Pipeline
     from sklearn.preprocessing import StandardScaler

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import get_args
 
 from dynresp.experiments.experiment_spec import Artefact
-from dynresp.support.errors import DynrespError
+from dynresp.support.errors import DynrespError, MissingExtraError
 
 PLAN, OPTIONS, WATCHING = "plan.png", "options.png", "watching.png"
 """Pictures of a way through a motion graph, of the actions offered, of the video followed."""
@@ -50,14 +50,14 @@ def attempt(write: Callable[[Path], None], path: Path) -> str:
         path: The file.
 
     Returns:
-        What `files` in `result.json` says: `WRITTEN`; or why there is none for this response or on
-        a machine that cannot draw; or why it failed.
+        What `files` in `result.json` says: `WRITTEN`; or why there is none for this response, on
+        a machine that cannot draw or without an optional package; or why it failed.
     """
     from dynresp.view.video_writer import RenderingUnavailableError
 
     try:
         write(path)
-    except (RenderingUnavailableError, NothingToShowError) as error:
+    except (RenderingUnavailableError, MissingExtraError, NothingToShowError) as error:
         return f"{_NOT_TO_BE_HAD}{error}"
     # One picture that fails, for whatever reason, must not cost the others and the figures.
     except Exception as error:

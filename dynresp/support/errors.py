@@ -57,6 +57,10 @@ class GraphFileError(UsageError):
     """A motion graph's file that cannot be read: damaged, of another format, or out of bounds."""
 
 
+class MissingExtraError(DynrespError):
+    """An optional package is not installed; the message names the command that installs it."""
+
+
 class FetchError(DynrespError):
     """Motion data could not be fetched or failed its checksum."""
 

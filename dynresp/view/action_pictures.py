@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynresp.motion.character import default_character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view import body_shapes as shapes
 from dynresp.view import raster
@@ -48,6 +49,7 @@ def write_options(
     Raises:
         DynrespError: The file cannot be written.
     """
+    require("matplotlib")
     from matplotlib.figure import Figure
 
     count = len(actions)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view import body_shapes as shapes
 from dynresp.view import raster
@@ -111,6 +112,7 @@ class _Strip:
 
     def figure(self) -> Figure:
         """Lay out and draw."""
+        require("matplotlib")
         from matplotlib.figure import Figure
 
         extents = np.array([self._extent(moment) for moment in self.moments])

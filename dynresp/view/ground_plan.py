@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dynresp.motion import rotations
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view.body_shapes import BLOCK_COLOR, BOUNDS_COLOR, CAPSULE_COLOR, PATH_COLORS, mix
 from dynresp.view.story import Block, MovingCapsule, Story, row_at
@@ -41,6 +42,7 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
     Raises:
         DynrespError: The file cannot be written.
     """
+    require("matplotlib")
     from matplotlib.collections import PatchCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Polygon

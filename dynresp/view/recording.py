@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynresp.support.errors import DynrespError
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view import body_shapes as shapes
 from dynresp.view.body_shapes import PHASE_COLORS, Color, Mesh
@@ -93,6 +94,7 @@ def write_recording(story: Story, path: Path | str, config: RecordingConfig | No
 @contextlib.contextmanager
 def _server() -> Iterator[ViserServer]:
     """A viser server on a free port, silent, and stopped at the end."""
+    require("viser")
     # viser would wait for ever for a server that cannot listen, so it is tried before.
     try:
         with socket.socket() as probe:

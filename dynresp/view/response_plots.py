@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import MotionError
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ def _heading(figure: Figure, title: str) -> None:
 
 
 def _figure(width: float, height: float) -> Figure:
+    require("matplotlib")
     from matplotlib.figure import Figure
 
     return Figure((width, height), dpi=_DPI, facecolor="white", layout="constrained")

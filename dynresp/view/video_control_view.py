@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view.action_pictures import PIXEL_M, pose_picture
 from dynresp.view.body_shapes import Color, mix
@@ -141,6 +142,7 @@ class _Sheet:
 
     def figure(self, title: str, subtitle: str) -> Figure:
         """Lay out and draw."""
+        require("matplotlib")
         from matplotlib.figure import Figure
 
         figure = Figure((self.width, self.height), dpi=_DPI, facecolor="white")

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.support import paths
+from dynresp.support.extras import require
 
 PROGRESS = "dynresp-video"
 """First word of a line that tells progress."""
@@ -39,6 +40,7 @@ def main(script_file: str, video_file: str) -> None:
         script_file: An .npz file as `dynresp.view.video_writer` makes it.
         video_file: The MP4 to write.
     """
+    require("imageio_ffmpeg")
     import imageio_ffmpeg
     import mujoco
 

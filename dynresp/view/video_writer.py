@@ -23,6 +23,7 @@ import numpy as np
 
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view import body_shapes as shapes
 from dynresp.view.body_shapes import Color, Mesh
@@ -91,6 +92,7 @@ def write_video(
         UsageError: A size or a frame rate that makes no video.
         DynrespError: The file cannot be written.
     """
+    require("imageio_ffmpeg")
     if any(not 16 <= n <= 4096 or n % 2 for n in size):
         raise UsageError(f"a video's width and height must be even, 16 to 4096, got {size}")
     fps = min(story.motion.fps, 60.0) if fps is None else fps

@@ -265,7 +265,7 @@ class TestRefused:
         monkeypatch.setitem(__import__("sys").modules, "cv2", None)
         result = dynresp("graph", "watch", graph, video, "--out", tmp_path / "out")
         assert result.exit_code == 1, result.output
-        assert "pip install opencv-python-headless" in result.stderr
+        assert "pip install 'dynresp[camera]'" in result.stderr
 
 
 class Camera:

@@ -19,7 +19,7 @@ import pytest
 from dynresp.datasets import dask_workers as cluster
 from dynresp.datasets.sample_worker import Job, Workshop
 from dynresp.datasets.shards import places
-from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.errors import DynrespError, MissingExtraError, UsageError
 
 from .samples import command, files, plan, ran, write_plan
 
@@ -192,8 +192,10 @@ def test_what_is_no_address_is_refused(address: str) -> None:
 
 
 def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed.security", None)
-    assert "pip install 'dynresp[cluster]'" in refused("tcp://127.0.0.1:1")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    job = Job(plan(), Path(), None, {})
+    with pytest.raises(MissingExtraError, match=r"pip install 'dynresp\[cluster\]'"):
+        next(cluster.make_there(job, places("x", 1, 1), "tcp://127.0.0.1:1", lambda: None))
 
 
 def test_nobody_listens(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ from dynresp.learning.evaluation_files import EVALUATION, PICTURE, TABLE, write_
 from dynresp.learning.holdout import Split
 from dynresp.learning.training import Trained, train
 from dynresp.response.prediction.classifier import ClassifierError
+from dynresp.results.result_folder import WRITTEN
 from dynresp.support.errors import UsageError
 
 from .conftest import QUICK
@@ -125,8 +126,8 @@ def test_strategies_are_judged_by_their_best_member(hits: Dataset) -> None:
 
 def test_the_folder_of_an_evaluation(trained: Trained, hits: Dataset, tmp_path: Path) -> None:
     content = evaluate(trained.classifier, hits, quiet)
-    names = write_report(tmp_path / "out", content)
-    assert names == [EVALUATION, TABLE, PICTURE]
+    files = write_report(tmp_path / "out", content)
+    assert files == dict.fromkeys([EVALUATION, TABLE, PICTURE], WRITTEN)
     told = json.loads((tmp_path / "out" / EVALUATION).read_text(encoding="utf-8"))
     assert told["accuracy"] == pytest.approx(content["accuracy"], abs=1e-6)
     with (tmp_path / "out" / TABLE).open(encoding="utf-8") as file:

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
 from dynresp.support.errors import MotionError, UsageError
+from dynresp.support.extras import require
 
 # When EM stops: at which gain in log-likelihood for one observation, or after how many steps.
 # While growing that may be early; the mixture that is kept runs to the end.
@@ -206,6 +207,7 @@ def fit_from_means(x: FloatArray, means: FloatArray, config: MixtureConfig) -> M
 
 
 def _em(x: FloatArray, start: Mixture, config: MixtureConfig, stop: tuple[float, int]) -> Mixture:
+    require("sklearn")
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.mixture import GaussianMixture
 

@@ -18,6 +18,7 @@ from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.vision.silhouette_table import ViewTable
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
+from dynresp.support.extras import require
 
 # Moments that are seen together: so long ago [s].
 _AGES_S = (0.0, 0.133, 0.267, 0.4, 0.6, 0.8, 1.0)
@@ -53,6 +54,7 @@ class Recogniser:
             seed: Of the examples and the network.
         """
         # Scikit-learn takes a second to import.
+        require("sklearn")
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPClassifier
         from threadpoolctl import threadpool_limits

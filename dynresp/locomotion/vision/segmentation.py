@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.support.errors import MotionError
+from dynresp.support.extras import require
 
 Picture = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.uint8]
@@ -58,6 +59,7 @@ class Segmenter:
             fps: Pictures per second.
             config: How to tell the person from the room.
         """
+        require("cv2")
         import cv2
 
         self.config = config or SegmentationConfig()

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from dynresp.locomotion.vision.silhouettes import Mask
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
+from dynresp.support.extras import require
 
 # The grid: rows and columns, and how far it reaches from the centre in radii.
 _GRID = (12, 8)
@@ -109,6 +110,7 @@ def measure(mask: Mask, shape: Shape) -> Measures | None:
     Returns:
         None where there is nothing inside.
     """
+    require("cv2")
     import cv2
 
     moments = cv2.moments(mask, binaryImage=True)

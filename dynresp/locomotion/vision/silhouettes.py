@@ -20,6 +20,7 @@ import numpy.typing as npt
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.extras import require
 
 Mask = npt.NDArray[np.uint8]
 
@@ -82,6 +83,7 @@ def draw_silhouettes(
         pelvis (the root) is where four pixels meet in the middle. The picture is drawn over by
         the next one.
     """
+    require("cv2")
     import cv2
 
     fill = cv2.fillConvexPoly

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.support.errors import MotionFileError
+from dynresp.support.extras import require
 
 Picture = npt.NDArray[np.uint8]
 
@@ -39,6 +40,7 @@ class Video:
             MotionFileError: It cannot be opened, is no video, its name is not UTF-8, or its
                 pictures are too large.
         """
+        require("cv2")
         import cv2
 
         is_camera = isinstance(source, int)

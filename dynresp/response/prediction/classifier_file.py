@@ -45,6 +45,7 @@ from dynresp.response.prediction.classifier import (
 from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
 from dynresp.response.prediction.hit_features import identity as features_identity
 from dynresp.support.errors import DynrespError
+from dynresp.support.extras import require
 from dynresp.support.files import replacing
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def save_classifier(
     """
     data = io.BytesIO()
     if pipelines is not None:
+        require("skops")
         import skops.io
 
         data = io.BytesIO(skops.io.dumps({name: pipelines[name] for name in MODELS}))
@@ -153,6 +155,7 @@ def load_pipelines(path: Path | str) -> dict[str, Pipeline]:
     Raises:
         ClassifierError: The file cannot be read, is damaged, or holds anything but such pipelines.
     """
+    require("skops", "sklearn")
     path = Path(path)
     with _opened(path) as archive:
         _read_about(archive)

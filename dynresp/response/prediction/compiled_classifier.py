@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
+from dynresp.support.extras import require
 
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
@@ -232,6 +233,7 @@ def _monomial_count(components: int) -> int:
 
 def _checked_steps(pipeline: Any) -> tuple[Any, Any, Any]:
     """Scaler, principal components and classifier of a pipeline that can be compiled."""
+    require("sklearn")
     from sklearn.decomposition import PCA
     from sklearn.exceptions import NotFittedError
     from sklearn.pipeline import Pipeline
