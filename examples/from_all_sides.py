@@ -34,5 +34,5 @@ for name, dots in sorted(moved.items()):
     angles, distances = zip(*dots, strict=True)
     axes.plot(angles, distances, "o", markersize=9, label=name)
 axes.set_title("How far the pelvis moves in 1.5 s [m] after a ball of 5 kg at 9 m/s")
-axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.05))
+axes.legend(loc="upper left", bbox_to_anchor=(-0.3, 1.0))
 figure.savefig(OUT / "from_all_sides.png", dpi=100)
