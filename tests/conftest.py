@@ -1,6 +1,7 @@
 """What all tests share: the character, a seeded generator, and real motion where there is some."""
 
 import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,12 @@ MOTIONS_VARIABLE = "DYNRESP_MOTIONS"
 # The same examples on every run and machine; no deadline, since a first call loads and compiles.
 settings.register_profile("dynresp", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("dynresp")
+
+
+# A shell that starts the tests in the background makes them ignore control-C, and so every process
+# that they start. The tests that send it want what a terminal gives.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _why_no_motions() -> str | None:

@@ -61,6 +61,14 @@ class Interruption:
         if unraisable.exc_type is not Interrupted:
             self._hook(unraisable)
             return
-        again = threading.Timer(_AGAIN_S, _thread.interrupt_main)
+        again = threading.Timer(_AGAIN_S, _interrupt_main_thread)
         again.daemon = True
         again.start()
+
+
+def _interrupt_main_thread() -> None:
+    """Send SIGINT to the main thread: unlike a note to the interpreter, it also ends a wait."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:  # Windows
+        _thread.interrupt_main()

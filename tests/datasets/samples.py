@@ -83,7 +83,7 @@ def command(*words: object) -> list[str]:
 
 
 def ran(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*words), capture_output=True, text=True, timeout=120)
+    return subprocess.run(command(*words), capture_output=True, text=True, timeout=600)
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -35,7 +35,7 @@ def workers_of(process: subprocess.Popen[str]) -> list[int]:
 
 
 def awaited(what: Callable[[], bool]) -> None:
-    until = time.monotonic() + 60.0
+    until = time.monotonic() + 600.0
     while not what():
         assert time.monotonic() < until, "waited for too long"
         time.sleep(0.01)
@@ -71,7 +71,7 @@ def test_killed_again_and_again_it_gives_the_same_bytes(
             )
             team = workers_of(job)
             job.kill()
-            job.wait(timeout=60)
+            job.wait(timeout=600)
             # Its workers notice that they are alone.
             awaited(lambda team=team: all(gone(pid) for pid in team))
         # What stands under a final name is whole.
@@ -89,7 +89,7 @@ def test_a_killed_worker_costs_nothing(
     with started(words) as job:
         awaited(lambda: len(workers_of(job)) == 2)
         os.kill(workers_of(job)[0], signal.SIGKILL)
-        _, said = job.communicate(timeout=120)
+        _, said = job.communicate(timeout=600)
         assert job.returncode == 0, said
     assert files(tmp_path / "out") == files(dataset)
 
@@ -106,7 +106,7 @@ def test_an_interruption_ends_it_in_order(
             os.killpg(job.pid, signal.SIGINT)
         else:
             job.send_signal(signal.SIGINT)
-        told, said = job.communicate(timeout=60)
+        told, said = job.communicate(timeout=600)
         assert job.returncode == 130
     assert told == ""
     assert said.endswith("dynresp: interrupted\n")
@@ -128,7 +128,7 @@ def test_a_file_that_cannot_be_written_ends_it(tmp_path: Path) -> None:
         "resource.setrlimit(resource.RLIMIT_FSIZE, (25_000, 25_000))\n"
         "dynresp.cli.main()"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
     assert done.returncode == 1
     assert "dynresp: cannot write" in done.stderr
     assert "Traceback" not in done.stderr

@@ -55,7 +55,7 @@ class Browser:
             stderr=subprocess.DEVNULL,
         )
         port_file = profile / "DevToolsActivePort"
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 300
         while not port_file.exists() or len(port_file.read_text().splitlines()) < 2:
             if time.monotonic() > deadline:
                 self._process.kill()
@@ -93,7 +93,7 @@ class Browser:
             message["sessionId"] = self._session
         self._socket.send(json.dumps(message))
         while True:
-            reply = json.loads(self._socket.recv(timeout=90))
+            reply = json.loads(self._socket.recv(timeout=300))
             if reply.get("id") == self._number:
                 if "error" in reply:
                     raise RuntimeError(f"{method}: {reply['error']}")

@@ -72,7 +72,7 @@ def test_two_processes_at_once(tmp_path: Path) -> None:
         )
         for file in files
     ]
-    assert [process.communicate(timeout=60)[0] for process in running] == ["", ""]
+    assert [process.communicate(timeout=600)[0] for process in running] == ["", ""]
     assert [process.returncode for process in running] == [0, 0]
     assert all(file.stat().st_size > 0.5e6 for file in files)
 

@@ -29,7 +29,7 @@ def test_it_plays_in_a_browser_without_a_network(tmp_path: Path, story: Story) -
     assert executable is not None
     with Browser(executable) as browser:
         browser.call("Page.navigate", url=file.as_uri())
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 300
         while not browser.evaluate(_TIME):
             assert time.monotonic() < deadline, browser.console
             time.sleep(0.2)

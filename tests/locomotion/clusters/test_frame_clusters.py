@@ -1,6 +1,5 @@
 """Observations of frames, and their clusters."""
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -183,9 +182,7 @@ def test_a_spacing_that_makes_no_sense_is_refused() -> None:
 @pytest.mark.parametrize("plan", ["walking", "playground"])
 def test_seeds_need_no_hand(plan: str, motions_folder: Path, character: Character) -> None:
     graph = planned_graph(plan, motions_folder, character)
-    began = time.thread_time()
     clusters = Clusters.of(graph)
-    took = time.thread_time() - began
     x = observations(graph.database, graph.config.coordinates, character)
     x = x[graph.frames[clusters.spacing // 2 :: clusters.spacing]]
     rng = np.random.default_rng(1)
@@ -194,10 +191,9 @@ def test_seeds_need_no_hand(plan: str, motions_folder: Path, character: Characte
     own = clusters.mixture
     best = max(m.log_likelihood(x) for m in tried)
     print(
-        f"{plan}: {len(clusters)} clusters in {took:.1f} s of one core, log-likelihood of "
+        f"{plan}: {len(clusters)} clusters, log-likelihood of "
         f"{len(x)} observations {own.log_likelihood(x):.0f}, of the best of 20 random starts "
         f"{best:.0f}; BIC {own.bic(x):.0f} and {max(m.bic(x) for m in tried):.0f}"
     )
     assert own.log_likelihood(x) >= best
     assert own.bic(x) >= max(m.bic(x) for m in tried)
-    assert took < 30.0

@@ -1,6 +1,5 @@
 """A million frames of walks by chance: how long it takes, and how well they hang together."""
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +30,6 @@ class Walk:
 
     graph: MotionGraph
     path: IntArray
-    walked_s: float
 
 
 @pytest.fixture(
@@ -45,9 +43,8 @@ def walk(request: pytest.FixtureRequest) -> Walk:
     graph = build_graph(read_plan(plan), folders, plan.parent, default_character(), lambda *_: None)
     rng = np.random.default_rng(1)
     random_walk(graph, 10, rng)
-    start = time.perf_counter()
     path = random_walk(graph, FRAMES, rng)
-    return Walk(graph, path, time.perf_counter() - start)
+    return Walk(graph, path)
 
 
 def test_a_million_frames_follow_the_ways_and_never_end(walk: Walk) -> None:
@@ -63,14 +60,12 @@ def test_a_million_frames_follow_the_ways_and_never_end(walk: Walk) -> None:
 
 
 def test_a_million_frames_are_played_without_a_flaw(walk: Walk) -> None:
-    graph, path, seconds = walk.graph, walk.path, walk.walked_s
+    graph, path = walk.graph, walk.path
     playback = Playback(graph, int(path[0]))
     playback.play(path[1:2])
     before, jumped = graph.database.poses[:0], []
     for at in range(2, FRAMES, STRETCH):
-        start = time.perf_counter()
         played = playback.play(path[at : at + STRETCH])
-        seconds += time.perf_counter() - start
         assert np.isfinite(played.poses).all()
         norms = np.linalg.norm(played.poses[:, 3:].reshape(-1, 14, 4), axis=-1)
         np.testing.assert_allclose(norms, 1.0, atol=1e-6)
@@ -81,27 +76,23 @@ def test_a_million_frames_are_played_without_a_flaw(walk: Walk) -> None:
         assert 0.3 < heights.min() <= heights.max() < 1.3
         jumped.append(at_jumps(motion, np.flatnonzero(played.jumps) + len(before)))
         before = played.poses[-3:]
-    assert FRAMES / seconds > 100_000
     below = np.mean(np.concatenate(jumped) <= source_limits(graph), axis=0)
     assert below[JOINTS] > 0.997
     assert below[ROOT] > 0.99
     assert below[ROOT_TURN] > 0.99
 
 
-def test_feet_are_fitted_fast_and_stand(walk: Walk, character: Character) -> None:
+def test_feet_are_fitted_and_stand(walk: Walk, character: Character) -> None:
     graph = walk.graph
     compose(graph, character, walk.path[:100])
-    seconds, jumped, slides, before = 0.0, [], [], []
+    jumped, slides, before = [], [], []
     for at in range(0, FITTED, STRETCH):
-        start = time.perf_counter()
         made = compose(graph, character, walk.path[at : at + STRETCH])
-        seconds += time.perf_counter() - start
         assert np.isfinite(made.motion.poses).all()
         jumped.append(at_jumps(made.motion, made.jumps))
         slides += foot_skates(made.motion, character)
         played = Motion(made.sliding, graph.config.fps, "", made.motion.contacts)
         before += foot_skates(played, character)
-    assert FITTED / seconds > 2_000
     assert np.mean(np.array(before) < 0.01) < 0.1
     assert np.mean(np.array(slides) < 0.01) > 0.99
     assert np.median(slides) < 1e-3
