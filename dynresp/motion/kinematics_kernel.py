@@ -17,7 +17,7 @@ _SIGNATURE = types.void(_ROWS, _INTS, _ROWS, _ROWS, _OUT, _OUT, _OUT)
 
 
 @njit(inline="always")
-def _carry(q, v, start, out):  # type: ignore[no-untyped-def]
+def _carry(q, v, start, out):
     """A point v of a frame that is turned by q and begins at start."""
     p = 2.0 * (q[2] * v[2] - q[3] * v[1])
     s = 2.0 * (q[3] * v[0] - q[1] * v[2])
@@ -28,9 +28,7 @@ def _carry(q, v, start, out):  # type: ignore[no-untyped-def]
 
 
 @compiled(_SIGNATURE)
-def kinematics_kernel(  # type: ignore[no-untyped-def]
-    poses, parents, offsets, center_offsets, positions, quaternions, centers
-):
+def kinematics_kernel(poses, parents, offsets, center_offsets, positions, quaternions, centers):
     """Write where the bodies are.
 
     Args:

@@ -11,7 +11,7 @@ from numba import njit
 
 
 @njit
-def multiply(a, b):  # type: ignore[no-untyped-def]
+def multiply(a, b):
     """The rotation b followed by the rotation a."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -22,13 +22,13 @@ def multiply(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit
-def from_to(a, b):  # type: ignore[no-untyped-def]
+def from_to(a, b):
     """The rotation, in the world, that leads from orientation a to b."""
     return multiply(b, (a[0], -a[1], -a[2], -a[3]))
 
 
 @njit
-def rotate(q, x, y, z):  # type: ignore[no-untyped-def]
+def rotate(q, x, y, z):
     """A vector rotated."""
     p = 2.0 * (q[2] * z - q[3] * y)
     s = 2.0 * (q[3] * x - q[1] * z)
@@ -41,13 +41,13 @@ def rotate(q, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit
-def row(rows, k):  # type: ignore[no-untyped-def]
+def row(rows, k):
     """The quaternion in row k of (n, 4)."""
     return rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
 
 
 @njit
-def to_vector(q):  # type: ignore[no-untyped-def]
+def to_vector(q):
     """Rotation vector [rad], the shorter way round."""
     sign = -1.0 if q[0] < 0.0 else 1.0
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -58,7 +58,7 @@ def to_vector(q):  # type: ignore[no-untyped-def]
 
 
 @njit
-def from_vector(x, y, z):  # type: ignore[no-untyped-def]
+def from_vector(x, y, z):
     """Quaternion of a rotation vector [rad]."""
     angle = math.sqrt(x * x + y * y + z * z)
     scale = 0.5
@@ -68,7 +68,7 @@ def from_vector(x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit
-def yaw_of(q):  # type: ignore[no-untyped-def]
+def yaw_of(q):
     """Facing [rad]: the twist about the vertical."""
     sign = -1.0 if q[0] < 0.0 else 1.0
     return 2.0 * math.atan2(sign * q[3], sign * q[0])

@@ -10,7 +10,7 @@ from numba import njit
 
 
 @njit
-def doubled(array):  # type: ignore[no-untyped-def]
+def doubled(array):
     """An array of twice as many rows that begins with those of another; the rest is not set."""
     more = np.empty((2 * len(array), *array.shape[1:]), array.dtype)
     more[: len(array)] = array

@@ -20,7 +20,7 @@ _SIGNATURE = types.int64(
 
 
 @compiled(_SIGNATURE, error_model="numpy")
-def farthest_kernel(places, clusters, apart, end, cluster, turned, nearest):  # type: ignore[no-untyped-def]
+def farthest_kernel(places, clusters, apart, end, cluster, turned, nearest):
     """Bring distances to the nearest action up to date with one more.
 
     Args:

@@ -34,7 +34,7 @@ _STAY = types.int32[::1](_INTS, _INTS, _INTS, _INT)
 
 
 @njit(inline="always")
-def _put(outer, inner, out):  # type: ignore[no-untyped-def]
+def _put(outer, inner, out):
     """The placement `inner` followed by `outer`, (4,) each, as `placement.compose`."""
     cosine, sine = math.cos(outer[3]), math.sin(outer[3])
     out[0] = outer[0] + cosine * inner[0] - sine * inner[1]
@@ -44,7 +44,7 @@ def _put(outer, inner, out):  # type: ignore[no-untyped-def]
 
 
 @compiled(_GROW, **_PLAIN)
-def grow_kernel(  # type: ignore[no-untyped-def]
+def grow_kernel(
     offsets, targets, logs, labels, root, depth, frames, parents, ways, steps, nodes,
     values, node_clusters, node_parents, node_visits,
 ):  # fmt: skip
@@ -111,7 +111,7 @@ def grow_kernel(  # type: ignore[no-untyped-def]
 
 
 @compiled(_PLACE, **_PLAIN)
-def place_kernel(frames, parents, ways, visits, successors, placements, planar, place):  # type: ignore[no-untyped-def]
+def place_kernel(frames, parents, ways, visits, successors, placements, planar, place):
     """Where the root is at visited frames.
 
     Args:
@@ -155,7 +155,7 @@ def place_kernel(frames, parents, ways, visits, successors, placements, planar, 
 
 
 @compiled(_ALONG, **_PLAIN)
-def along_kernel(offsets, targets, placements, planar, frames, place, out):  # type: ignore[no-untyped-def]
+def along_kernel(offsets, targets, placements, planar, frames, place, out):
     """Where the root is along ways of the graph.
 
     Args:
@@ -185,7 +185,7 @@ def along_kernel(offsets, targets, placements, planar, frames, place, out):  # t
 
 
 @compiled(_BACK, **_PLAIN)
-def back_kernel(values, parents, last):  # type: ignore[no-untyped-def]
+def back_kernel(values, parents, last):
     """Values (s,) from a root to one of its descendants.
 
     Args:
@@ -205,7 +205,7 @@ def back_kernel(values, parents, last):  # type: ignore[no-untyped-def]
 
 
 @compiled(_STAY, **_PLAIN)
-def stay_kernel(likeliest, labels, frames, most):  # type: ignore[no-untyped-def]
+def stay_kernel(likeliest, labels, frames, most):
     """Frames (s,), and those by which it goes on while the cluster remains.
 
     Args:

@@ -30,7 +30,7 @@ _PROBABLE = types.Tuple((types.int32[::1], types.float64))(
 
 
 @njit(**_PLAIN)
-def _states(path, sizes):  # type: ignore[no-untyped-def]
+def _states(path, sizes):
     """(p + 1,) where the states of each place of a path begin: one a frame of its cluster."""
     begins = np.zeros(len(path) + 1, np.int64)
     for k in range(len(path)):
@@ -39,9 +39,7 @@ def _states(path, sizes):  # type: ignore[no-untyped-def]
 
 
 @njit(**_PLAIN)
-def _steps_left(  # type: ignore[no-untyped-def]
-    back_offsets, back_sources, labels, ranks, sizes, members, path, begins, depth
-):
+def _steps_left(back_offsets, back_sources, labels, ranks, sizes, members, path, begins, depth):
     """Fewest steps from each state of a path to its last cluster; more than the depth for never.
 
     It goes back from there, breadth first.
@@ -76,7 +74,7 @@ def _steps_left(  # type: ignore[no-untyped-def]
 
 
 @njit(**_PLAIN)
-def _best_first(  # type: ignore[no-untyped-def]
+def _best_first(
     offsets, targets, logs, belongs, labels, ranks, ahead, root, path, begins, left, depth, bounded,
     most,
 ):  # fmt: skip
@@ -156,7 +154,7 @@ def _best_first(  # type: ignore[no-untyped-def]
 
 
 @compiled(_PROBABLE, **_PLAIN)
-def probable_kernel(  # type: ignore[no-untyped-def]
+def probable_kernel(
     offsets, targets, logs, back_offsets, back_sources, belongs, labels, ranks, sizes, members,
     leaps, path, known, log_known, depth,
 ):  # fmt: skip

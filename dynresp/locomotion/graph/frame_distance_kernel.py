@@ -61,7 +61,7 @@ _FASTMATH = {"contract", "nnan", "nsz", "reassoc"}
 
 
 @njit(inline="always")
-def _half_squared(aw, ax, ay, az, bw, bx, by, bz):  # type: ignore[no-untyped-def]
+def _half_squared(aw, ax, ay, az, bw, bx, by, bz):
     """Half the angle between two rotations, squared."""
     sign = _ONE if aw * bw + ax * bx + ay * by + az * bz >= _ZERO else -_ONE
     w, x, y, z = aw - sign * bw, ax - sign * bx, ay - sign * by, az - sign * bz
@@ -70,7 +70,7 @@ def _half_squared(aw, ax, ay, az, bw, bx, by, bz):  # type: ignore[no-untyped-de
 
 
 @njit(inline="always")
-def _sketched(sketch, own, start, count, sums):  # type: ignore[no-untyped-def]
+def _sketched(sketch, own, start, count, sums):
     """Squared distances of sketches from one of them."""
     for d in range(0, SKETCH, 4):
         x0, x1, x2, x3 = sketch[d, own], sketch[d + 1, own], sketch[d + 2, own], sketch[d + 3, own]
@@ -83,7 +83,7 @@ def _sketched(sketch, own, start, count, sums):  # type: ignore[no-untyped-def]
 
 
 @compiled(_SIGNATURE, fastmath=_FASTMATH)
-def close_pairs(  # type: ignore[no-untyped-def]
+def close_pairs(
     first,
     stop,
     place_of,

@@ -21,7 +21,7 @@ _SIGNATURE = types.void(
 
 
 @compiled(_SIGNATURE)
-def keep_best_of_neighbours(first, offsets, columns, distances, clip_of, keep):  # type: ignore[no-untyped-def]
+def keep_best_of_neighbours(first, offsets, columns, distances, clip_of, keep):
     """Mark the pairs that no neighbour in the matrix surpasses.
 
     Neighbours of (i, j) are the up to eight pairs (i', j') among those given with |i' - i| <= 1

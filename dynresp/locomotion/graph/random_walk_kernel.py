@@ -16,7 +16,7 @@ _SIGNATURE = types.void(_OFFSETS, _TARGETS, _FLOATS, _FLOATS, types.int32[::1])
 
 
 @compiled(_SIGNATURE)
-def walk_kernel(offsets, targets, cumulative, chances, path):  # type: ignore[no-untyped-def]
+def walk_kernel(offsets, targets, cumulative, chances, path):
     """Write a walk.
 
     Args:

@@ -26,7 +26,7 @@ _PLAY = types.void(
 
 
 @njit(inline="always")
-def _turn(yaw, q, out):  # type: ignore[no-untyped-def]
+def _turn(yaw, q, out):
     """A quaternion turned about the vertical."""
     c, s = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -37,7 +37,7 @@ def _turn(yaw, q, out):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _turned_by(q, x, y, z, out):  # type: ignore[no-untyped-def]
+def _turned_by(q, x, y, z, out):
     """The quaternion q times the rotation by |v| about v = (x, y, z)."""
     angle = math.sqrt(x * x + y * y + z * z)
     if angle < 1e-6:
@@ -53,7 +53,7 @@ def _turned_by(q, x, y, z, out):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _turn_between(a, b, out):  # type: ignore[no-untyped-def]
+def _turn_between(a, b, out):
     """Rotation vector of inverse(a) times b, the shorter way."""
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     x = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]
@@ -67,7 +67,7 @@ def _turn_between(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _move(place, dx, dy, dz, turn):  # type: ignore[no-untyped-def]
+def _move(place, dx, dy, dz, turn):
     """A placement followed by one that is seen from it."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     place[0] += cosine * dx - sine * dy
@@ -78,7 +78,7 @@ def _move(place, dx, dy, dz, turn):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _decay(offset, rate, age, blend_s, rate_s):  # type: ignore[no-untyped-def]
+def _decay(offset, rate, age, blend_s, rate_s):
     """Bring a displacement and its rate to what they are at an age: cubics that end at rest.
 
     The root takes twice as long as joints to change its speed: with as short a time it would jerk,
@@ -98,7 +98,7 @@ def _decay(offset, rate, age, blend_s, rate_s):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _put(pose, place, offset, out):  # type: ignore[no-untyped-def]
+def _put(pose, place, offset, out):
     """A recorded pose, placed and displaced."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     out[0] = place[0] + cosine * pose[0] - sine * pose[1] + offset[0]
@@ -113,7 +113,7 @@ def _put(pose, place, offset, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _jacobian(x, y, z, v, inverse, out):  # type: ignore[no-untyped-def]
+def _jacobian(x, y, z, v, inverse, out):
     """The right Jacobian of rotations at a rotation vector o = (x, y, z), or its inverse, times v.
 
     It takes the rate of change of o to the angular velocity of the rotation by o, in the turned
@@ -139,7 +139,7 @@ def _jacobian(x, y, z, v, inverse, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _turned_back(x, y, z, v, out):  # type: ignore[no-untyped-def]
+def _turned_back(x, y, z, v, out):
     """A vector v seen from a frame that is turned by a rotation vector (x, y, z)."""
     square = x * x + y * y + z * z
     angle = math.sqrt(square)
@@ -154,7 +154,7 @@ def _turned_back(x, y, z, v, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _carry_on(velocity, place, offset, rate, out):  # type: ignore[no-untyped-def]
+def _carry_on(velocity, place, offset, rate, out):
     """How a recorded frame moves that is placed and displaced."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     out[0] = cosine * velocity[0] - sine * velocity[1] + rate[0]
@@ -170,7 +170,7 @@ def _carry_on(velocity, place, offset, rate, out):  # type: ignore[no-untyped-de
 
 
 @njit
-def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):  # type: ignore[no-untyped-def]
+def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
     """What to displace a placed frame by, for it to be a pose that moves with a velocity."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     offset[0] = pose[0] - (place[0] + cosine * recorded[0] - sine * recorded[1])
@@ -195,9 +195,7 @@ def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):  # t
 
 
 @compiled(_DISPLACE)
-def displacement_kernel(  # type: ignore[no-untyped-def]
-    pose, velocity, place, recorded, its_velocity, offset, rate
-):
+def displacement_kernel(pose, velocity, place, recorded, its_velocity, offset, rate):
     """Write what a placed frame is displaced by for it to be a pose that moves with a velocity.
 
     Args:
@@ -214,7 +212,7 @@ def displacement_kernel(  # type: ignore[no-untyped-def]
 
 
 @compiled(_PLAY)
-def play_kernel(  # type: ignore[no-untyped-def]
+def play_kernel(
     poses, velocities, frames, jumps, moves, fps, blend_s, rate_s,
     place, offset, rate, age, played, placements, moving,
 ):  # fmt: skip

@@ -12,7 +12,7 @@ _WRAP = 1 << 14
 
 
 @njit
-def sift_up(costs, ways, at):  # type: ignore[no-untyped-def]
+def sift_up(costs, ways, at):
     """Bring the last entry of a heap to its place; of equal costs the lower way comes first."""
     cost, way = costs[at], ways[at]
     while at > 0:
@@ -25,7 +25,7 @@ def sift_up(costs, ways, at):  # type: ignore[no-untyped-def]
 
 
 @njit
-def sift_down(costs, ways, size):  # type: ignore[no-untyped-def]
+def sift_down(costs, ways, size):
     """Bring the first entry of a heap to its place."""
     cost, way, at = costs[0], ways[0], 0
     while True:
@@ -46,7 +46,7 @@ def sift_down(costs, ways, size):  # type: ignore[no-untyped-def]
 
 
 @njit
-def slot_of(keys, key):  # type: ignore[no-untyped-def]
+def slot_of(keys, key):
     """Where a key is, or belongs, in a table with open addresses; -1 marks what is empty."""
     mask = len(keys) - 1
     at = ((key * 0x9E3779B97F4A7C1) >> 20) & mask
@@ -56,7 +56,7 @@ def slot_of(keys, key):  # type: ignore[no-untyped-def]
 
 
 @njit
-def number(frame, x, y, yaw, done):  # type: ignore[no-untyped-def]
+def number(frame, x, y, yaw, done):
     """Cells as one number; far places may share it."""
     column = np.int64(math.floor(x)) & (_WRAP - 1)
     row = np.int64(math.floor(y)) & (_WRAP - 1)

@@ -57,9 +57,7 @@ _COSTS = types.Array(types.float32, 1, "C", readonly=True)
 
 
 @njit
-def _play(  # type: ignore[no-untyped-def]
-    entry, stop, state, planar, still, path, facing, settings
-):
+def _play(entry, stop, state, planar, still, path, facing, settings):
     """Play frames entry to stop of a clip, and bring its state up to there.
 
     Returns:
@@ -94,7 +92,7 @@ def _play(  # type: ignore[no-untyped-def]
 
 
 @njit
-def _enter(state, placement):  # type: ignore[no-untyped-def]
+def _enter(state, placement):
     """Put the clip of a state where a way leads: its own placement, then the way's, in it."""
     cosine, sine = math.cos(state[YAW]), math.sin(state[YAW])
     state[X] += cosine * placement[0] - sine * placement[1]
@@ -103,7 +101,7 @@ def _enter(state, placement):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _free(entry, stop, state, planar, feet, grid):  # type: ignore[no-untyped-def]
+def _free(entry, stop, state, planar, feet, grid):
     """Whether no footprint of the frames entry to stop, as recorded, touches a box."""
     corner, clearance, starts, members, boxes = grid
     cosine, sine = math.cos(state[YAW]), math.sin(state[YAW])
@@ -120,9 +118,7 @@ def _free(entry, stop, state, planar, feet, grid):  # type: ignore[no-untyped-de
 
 
 @njit
-def _plays_free(  # type: ignore[no-untyped-def]
-    left, entry, stop, move, motion, playing, body, grid, settings
-):
+def _plays_free(left, entry, stop, move, motion, playing, body, grid, settings):
     """Play frames entry to stop after another; whether no pose of them touches a box.
 
     `playing` is brought up to where it ends.
@@ -163,7 +159,7 @@ def _plays_free(  # type: ignore[no-untyped-def]
 
 
 @njit
-def _places(frame, state, planar, settings):  # type: ignore[no-untyped-def]
+def _places(frame, state, planar, settings):
     """Two numbers for where a frame's root is: states at one place, and in one neighbourhood.
 
     The progress of the state from which a way leads tells apart a path's visits to one place.
@@ -187,7 +183,7 @@ _FOUND = types.Tuple((types.int64[::1], types.float64[::1], types.float64[:, ::1
         types.UniTuple(ROWS, 2), types.Tuple(BODY), types.Tuple(GRID), types.int64[::1],
     )
 )  # fmt: skip
-def search_kernel(  # type: ignore[no-untyped-def]
+def search_kernel(
     start, begin, playing, settings, path, facing, budget, crowded,
     offsets, targets, distances, placements, planar, ends, still, feet,
     motion, body, grid, told,

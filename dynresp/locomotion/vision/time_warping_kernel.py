@@ -21,7 +21,7 @@ _SIGNATURE = types.void(
 
 
 @compiled(_SIGNATURE)
-def warp_kernel(first, rows, offsets, open_end, costs, stops):  # type: ignore[no-untyped-def]
+def warp_kernel(first, rows, offsets, open_end, costs, stops):
     """Warp one sequence onto each of many; see `warping.warp_onto`.
 
     Args:

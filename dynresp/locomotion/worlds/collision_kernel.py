@@ -27,7 +27,7 @@ GRID = (REALS, CLEARANCE, LISTS, LISTS, ROWS)
 
 
 @njit(inline="always")
-def _apart(x, y, cosine, sine, half_x, half_y, box):  # type: ignore[no-untyped-def]
+def _apart(x, y, cosine, sine, half_x, half_y, box):
     """Whether a line along a side separates two rectangles (the separating axis theorem)."""
     away_x, away_y = box[0] - x, box[1] - y
     # Cosine and sine of the turn from one to the other.
@@ -42,9 +42,7 @@ def _apart(x, y, cosine, sine, half_x, half_y, box):  # type: ignore[no-untyped-
 
 
 @njit
-def collides(  # type: ignore[no-untyped-def]
-    x, y, cosine, sine, footprint, margin, frame, clearance, starts, members, boxes
-):
+def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, members, boxes):
     """Whether a footprint, widened by a margin on all sides, overlaps a box or leaves the grid.
 
     Args:
@@ -83,7 +81,7 @@ def collides(  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _away(x, y, box):  # type: ignore[no-untyped-def]
+def _away(x, y, box):
     """Distance of a point to a box [m], negative inside."""
     x, y = x - box[0], y - box[1]
     beyond_x = abs(box[4] * x + box[5] * y) - box[2]
@@ -95,7 +93,7 @@ def _away(x, y, box):  # type: ignore[no-untyped-def]
 @compiled(
     types.void(ROWS, WINDOWS, REALS, types.float64, types.float32[:, ::1], types.int64[::1])
 )  # fmt: skip
-def count_kernel(boxes, windows, frame, near, clearance, counts):  # type: ignore[no-untyped-def]
+def count_kernel(boxes, windows, frame, near, clearance, counts):
     """Count the boxes near to each cell of a grid, and find how near they come.
 
     Args:
@@ -119,7 +117,7 @@ def count_kernel(boxes, windows, frame, near, clearance, counts):  # type: ignor
 @compiled(
     types.void(ROWS, WINDOWS, REALS, types.float64, types.int64, types.int64[::1], types.int32[::1])
 )  # fmt: skip
-def list_kernel(boxes, windows, frame, near, rows, free, members):  # type: ignore[no-untyped-def]
+def list_kernel(boxes, windows, frame, near, rows, free, members):
     """List the boxes near to each cell of a grid, ascending.
 
     Args:
@@ -142,9 +140,7 @@ def list_kernel(boxes, windows, frame, near, rows, free, members):  # type: igno
 
 
 @compiled(types.void(ROWS, types.float64, *GRID, types.float64[::1]))
-def distances_kernel(  # type: ignore[no-untyped-def]
-    points, farthest, frame, clearance, starts, members, boxes, out
-):
+def distances_kernel(points, farthest, frame, clearance, starts, members, boxes, out):
     """How far points are from the nearest box.
 
     Args:
@@ -173,9 +169,7 @@ def distances_kernel(  # type: ignore[no-untyped-def]
 
 
 @compiled(types.void(ROWS, FOOTPRINTS, types.float64, *GRID, types.boolean[::1]))
-def collisions_kernel(  # type: ignore[no-untyped-def]
-    roots, footprints, margin, frame, clearance, starts, members, boxes, out
-):
+def collisions_kernel(roots, footprints, margin, frame, clearance, starts, members, boxes, out):
     """Test many footprints.
 
     Args:

@@ -24,7 +24,7 @@ SPHERE, CAPSULE, BOX = 2, 3, 6
 
 
 @njit(inline="always")
-def _level(q, v):  # type: ignore[no-untyped-def]
+def _level(q, v):
     """Level part (x and y) of a vector that is rotated by a quaternion."""
     p = 2.0 * (q[2] * v[2] - q[3] * v[1])
     s = 2.0 * (q[3] * v[0] - q[1] * v[2])
@@ -33,7 +33,7 @@ def _level(q, v):  # type: ignore[no-untyped-def]
 
 
 @njit
-def footprint(pose, positions, quaternions, body, out):  # type: ignore[no-untyped-def]
+def footprint(pose, positions, quaternions, body, out):
     """Write the footprint of one pose.
 
     Args:
@@ -81,7 +81,7 @@ def footprint(pose, positions, quaternions, body, out):  # type: ignore[no-untyp
 
 
 @compiled(types.void(ROWS, types.Tuple(BODY), types.float64[:, ::1]))
-def footprints_kernel(poses, body, out):  # type: ignore[no-untyped-def]
+def footprints_kernel(poses, body, out):
     """Write the footprints of many poses.
 
     Args:

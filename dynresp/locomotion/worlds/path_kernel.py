@@ -19,7 +19,7 @@ _ALIKE = 1e-9
 
 
 @njit
-def nearest_on(path, x, y, progress, window):  # type: ignore[no-untyped-def]
+def nearest_on(path, x, y, progress, window):
     """The nearest point of a path, from what is done of it on; of equal ones the first.
 
     Args:
@@ -51,7 +51,7 @@ def nearest_on(path, x, y, progress, window):  # type: ignore[no-untyped-def]
 
 
 @njit
-def eq_8(path, x, y, cosine, sine, progress, target, away, ahead, facing, spacing):  # type: ignore[no-untyped-def]
+def eq_8(path, x, y, cosine, sine, progress, target, away, ahead, facing, spacing):
     """Eq. 8 with the way left along the path in place of the straight distance [m].
 
     Args:

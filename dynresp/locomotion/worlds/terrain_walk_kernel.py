@@ -52,7 +52,7 @@ _FEET = types.Tuple(
 
 
 @njit
-def _turned(a, b, turns):  # type: ignore[no-untyped-def]
+def _turned(a, b, turns):
     """The block (a, b) after quarter turns about the origin, a corner of blocks."""
     if turns == 0:
         return a, b
@@ -64,7 +64,7 @@ def _turned(a, b, turns):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _moved(place, move, out):  # type: ignore[no-untyped-def]
+def _moved(place, move, out):
     """Put a clip where a way leads: its own placement, then the way's, in it."""
     a, b = move[0], move[1]
     for _ in range(place[TURNS]):
@@ -76,21 +76,21 @@ def _moved(place, move, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _block(cells, frame, foot, place):  # type: ignore[no-untyped-def]
+def _block(cells, frame, foot, place):
     """Column and row of the block on which a foot stands."""
     a, b = _turned(cells[frame, foot, 0], cells[frame, foot, 1], place[TURNS])
     return a + place[COLUMN], b + place[ROW]
 
 
 @njit
-def _level_at(grid, a, b, otherwise):  # type: ignore[no-untyped-def]
+def _level_at(grid, a, b, otherwise):
     if 0 <= a < grid.shape[0] and 0 <= b < grid.shape[1]:
         return grid[a, b]
     return otherwise
 
 
 @njit
-def _drawn(grid, a, b, over, turns):  # type: ignore[no-untyped-def]
+def _drawn(grid, a, b, over, turns):
     """How far a foot must be drawn in from edges of its block at which the height changes [m]."""
     here = grid[a, b]
     x = y = 0.0
@@ -110,7 +110,7 @@ def _drawn(grid, a, b, over, turns):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _stand(grid, feet, entry, left, before, place, settings):  # type: ignore[no-untyped-def]
+def _stand(grid, feet, entry, left, before, place, settings):
     """Go from a frame to the next.
 
     Args:
@@ -155,7 +155,7 @@ def _stand(grid, feet, entry, left, before, place, settings):  # type: ignore[no
 
 
 @njit
-def _root(planar, frame, place, block):  # type: ignore[no-untyped-def]
+def _root(planar, frame, place, block):
     """Where the root is: x, y and yaw."""
     x, y = planar[frame, 0], planar[frame, 1]
     for _ in range(place[TURNS]):
@@ -165,7 +165,7 @@ def _root(planar, frame, place, block):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _value(path, x, y, yaw, progress, away, settings):  # type: ignore[no-untyped-def]
+def _value(path, x, y, yaw, progress, away, settings):
     """Eq. 8 to the end of the path [m]."""
     return eq_8(
         path, x, y, math.cos(yaw), math.sin(yaw), progress, len(path) - 1.0, away,
@@ -174,7 +174,7 @@ def _value(path, x, y, yaw, progress, away, settings):  # type: ignore[no-untype
 
 
 @njit
-def _key(frame, place):  # type: ignore[no-untyped-def]
+def _key(frame, place):
     """One number for a frame and where on the grid its clip is put."""
     key = np.int64(frame) * 4 + place[TURNS]
     key = key * _WRAP + place[COLUMN] + _BESIDE
@@ -187,7 +187,7 @@ def _key(frame, place):  # type: ignore[no-untyped-def]
         types.int64[::1],
     )
 )  # fmt: skip
-def search_kernel(start, begin, settings, path, budget, graph, planar, feet, grid, told):  # type: ignore[no-untyped-def]
+def search_kernel(start, begin, settings, path, budget, graph, planar, feet, grid, told):
     """Find a way along a path.
 
     Args:

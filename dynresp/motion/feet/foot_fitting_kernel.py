@@ -35,7 +35,7 @@ _TRACK = types.UniTuple(_ROWS, 2)
 
 
 @njit
-def _fading(value, slope, at, length):  # type: ignore[no-untyped-def]
+def _fading(value, slope, at, length):
     """The cubic from a value and its slope per frame to neither in `length` frames."""
     if at >= length:
         return 0.0
@@ -44,7 +44,7 @@ def _fading(value, slope, at, length):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _lowest(q, balls):  # type: ignore[no-untyped-def]
+def _lowest(q, balls):
     """Height above the ankle of the lowest of some balls (n, 4), centre and radius, on a foot."""
     low = np.inf
     for k in range(len(balls)):
@@ -54,19 +54,19 @@ def _lowest(q, balls):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _low(track, k, balls):  # type: ignore[no-untyped-def]
+def _low(track, k, balls):
     """Height above the ground of the lowest of some balls on a foot at frame k."""
     return track[0][k, 2] + _lowest(row(track[1], k), balls)
 
 
 @njit
-def _wanted(played, turn, k):  # type: ignore[no-untyped-def]
+def _wanted(played, turn, k):
     """Orientation of the corrected foot at frame k."""
     return multiply(from_vector(turn[k, 0], turn[k, 1], turn[k, 2]), row(played[1], k))
 
 
 @njit
-def _slide(before, after, x, y, sole, touch, ways, touching):  # type: ignore[no-untyped-def]
+def _slide(before, after, x, y, sole, touch, ways, touching):
     """The way of the sole's stillest point where the ankle goes by (x, y) over the ground.
 
     Args:
@@ -91,7 +91,7 @@ def _slide(before, after, x, y, sole, touch, ways, touching):  # type: ignore[no
 
 
 @njit
-def _facing(start, window_stop, last, played, source, weight, turn, quickest):  # type: ignore[no-untyped-def]
+def _facing(start, window_stop, last, played, source, weight, turn, quickest):
     """How much a stance that begins is turned about the vertical from the source [rad]."""
     sine = cosine = 0.0
     for k in range(start, window_stop):
@@ -107,7 +107,7 @@ def _facing(start, window_stop, last, played, source, weight, turn, quickest):  
 
 
 @njit
-def _misfit(k, played, source, jump, shift, turn, sole):  # type: ignore[no-untyped-def]
+def _misfit(k, played, source, jump, shift, turn, sole):
     """What of a standing foot does not fit the source from frame k on, going on as played there.
 
     Returns:
@@ -136,7 +136,7 @@ def _misfit(k, played, source, jump, shift, turn, sole):  # type: ignore[no-unty
 
 
 @njit
-def _stand(  # type: ignore[no-untyped-def]
+def _stand(
     start, stop, goes_on, hurry, yaw, played, source, jump, bound, sole, balls, blend, shift, turn
 ):
     """Write how the foot is turned, and how high it is, in a stance.
@@ -166,7 +166,7 @@ def _stand(  # type: ignore[no-untyped-def]
 
 
 @njit
-def _hold(  # type: ignore[no-untyped-def]
+def _hold(
     start, stop, goes_on, played, source, contact, jump, sole, still, touch, shift, turn,
     ways, touching,
 ):  # fmt: skip
@@ -202,7 +202,7 @@ def _hold(  # type: ignore[no-untyped-def]
 
 
 @njit
-def _restrain(start, stop, goes_on, farthest, shift):  # type: ignore[no-untyped-def]
+def _restrain(start, stop, goes_on, farthest, shift):
     """Let a foot slide that would be held too far from where it is played."""
     if goes_on:
         farthest = max(farthest, math.hypot(shift[start - 1, 0], shift[start - 1, 1]))
@@ -213,7 +213,7 @@ def _restrain(start, stop, goes_on, farthest, shift):  # type: ignore[no-untyped
 
 
 @njit
-def _swing(last, following, known, ease, values):  # type: ignore[no-untyped-def]
+def _swing(last, following, known, ease, values):
     """Ease a correction (n, 3) from one frame in which it is known to the next.
 
     Args:
@@ -252,7 +252,7 @@ def _swing(last, following, known, ease, values):  # type: ignore[no-untyped-def
         types.float64[:, ::1], types.float64[:, ::1],
     )
 )  # fmt: skip
-def correct_kernel(  # type: ignore[no-untyped-def]
+def correct_kernel(
     played,
     source,
     contact,

@@ -13,7 +13,7 @@ _NEAR = 1e-4
 
 
 @njit
-def into_discs(x, y, discs):  # type: ignore[no-untyped-def]
+def into_discs(x, y, discs):
     """Move a point into discs, or to where it is least far out of them if they have none in common.
 
     It moves towards the centre of the disc that it is farthest out of, again and again, and by ever
@@ -43,7 +43,7 @@ def into_discs(x, y, discs):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _discs(start, stop, played, shift, leg, lowered, farthest, discs):  # type: ignore[no-untyped-def]
+def _discs(start, stop, played, shift, leg, lowered, farthest, discs):
     """Write where a stance may be put (2 (stop - start), 3) so that the leg reaches it throughout.
 
     Also so that the foot is not too far from where it is played.
@@ -61,7 +61,7 @@ def _discs(start, stop, played, shift, leg, lowered, farthest, discs):  # type: 
 
 
 @njit
-def _near(x, y, start, last, most, shift):  # type: ignore[no-untyped-def]
+def _near(x, y, start, last, most, shift):
     """A place drawn so near to the last stance that a correction changes by `most` a frame."""
     if last < 0:
         return x, y
@@ -71,9 +71,7 @@ def _near(x, y, start, last, most, shift):  # type: ignore[no-untyped-def]
 
 
 @njit
-def put(  # type: ignore[no-untyped-def]
-    start, stop, window_stop, last, weight, played, leg, limits, shift
-):
+def put(start, stop, window_stop, last, weight, played, leg, limits, shift):
     """Shift a stance that begins to where it departs least from what is played, but within reach.
 
     If it can be, within reach of the leg as it is played; else of one whose hip is lowered.

@@ -17,7 +17,7 @@ _CORNERS = types.Array(types.float64, 3, "C", readonly=True)
 
 
 @njit
-def least_way(ways, touching):  # type: ignore[no-untyped-def]
+def least_way(ways, touching):
     """How far the sole's stillest point moves.
 
     A sole that is turned and shifted moves its points by a linear map of where they are, so the
@@ -61,7 +61,7 @@ def least_way(ways, touching):  # type: ignore[no-untyped-def]
 
 
 @compiled(types.float64[:](_CORNERS, types.float64))
-def slides_kernel(corners, touch):  # type: ignore[no-untyped-def]
+def slides_kernel(corners, touch):
     """How far a foot slides from each frame to the next.
 
     Args:

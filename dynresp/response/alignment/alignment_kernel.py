@@ -73,7 +73,7 @@ _FAST: dict[str, Any] = {**_PLAIN, "fastmath": {"contract", "nnan", "nsz", "reas
 
 
 @njit(forceinline=True, **_FAST)
-def _heading(track, row, at, share, bodies):  # type: ignore[no-untyped-def]
+def _heading(track, row, at, share, bodies):
     """Ground point and half yaw of the pelvis at a window's first frame, and their rates."""
     end = at + bodies
     x, y = track[at], track[row + at]
@@ -90,7 +90,7 @@ def _heading(track, row, at, share, bodies):  # type: ignore[no-untyped-def]
 
 
 @njit(forceinline=True, **_FAST)
-def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp, wt):  # type: ignore[no-untyped-def]
+def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp, wt):
     """Error of two windows [m] and its slopes along the first frame of either [m/frame].
 
     The window of track `a` begins `a_share`, 0 to 1, after its frame `a_frame`; that of `b`
@@ -160,7 +160,7 @@ def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp,
 
 
 @njit(**_FAST)
-def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):  # type: ignore[no-untyped-def]
+def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):
     """Error alone; what the slopes cost falls away when this is compiled."""
     s, m = int(exit_at), int(entry_at)
     found = _measure(a, a_row, s, exit_at - s, b, b_row, m, entry_at - m, bodies, wp, wt)
@@ -168,7 +168,7 @@ def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):  # type: igno
 
 
 @njit(**_FAST)
-def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):  # type: ignore[no-untyped-def]
+def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):
     """Error and slopes; at the upper ends of the box, the slopes from below."""
     s, m = int(exit_at), int(entry_at)
     if exit_at >= last and s == exit_at and s > 0:
@@ -179,7 +179,7 @@ def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):
 
 
 @compiled(_LAY_OUT, **_PLAIN)
-def lay_out(positions, quaternions, frames, rows):  # type: ignore[no-untyped-def]
+def lay_out(positions, quaternions, frames, rows):
     """Lay out a track; one more frame, a copy of the last, and finite padding follow.
 
     Args:
@@ -223,13 +223,13 @@ def lay_out(positions, quaternions, frames, rows):  # type: ignore[no-untyped-de
 
 
 @njit(**_PLAIN)
-def _free(at, low, high, slope):  # type: ignore[no-untyped-def]
+def _free(at, low, high, slope):
     """Whether going down the slope stays between the bounds."""
     return not ((at <= low and slope >= 0.0) or (at >= high and slope <= 0.0))
 
 
 @njit(**_PLAIN)
-def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step, most, gain):  # type: ignore[no-untyped-def]
+def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step, most, gain):
     """BFGS from a sample, projected on the box: error, exit, entry and evaluations."""
     f, gs, gm = _slope(a, a_row, s, last, b, b_row, m, latest, bodies, wp, wt)
     evaluations = 1
@@ -284,7 +284,7 @@ def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step
 
 
 @compiled(_ALIGN, **_PLAIN)
-def align_kernel(  # type: ignore[no-untyped-def]
+def align_kernel(
     positions, quaternions, rows, clips, places, wp, wt, frames, exits, step, patience, starts,
     most, gain, found,
 ):  # fmt: skip
@@ -367,9 +367,7 @@ def align_kernel(  # type: ignore[no-untyped-def]
 
 
 @compiled(_ERRORS, **_PLAIN)
-def errors_kernel(  # type: ignore[no-untyped-def]
-    positions, quaternions, clips, place, wp, wt, frames, exits, entries, errors
-):
+def errors_kernel(positions, quaternions, clips, place, wp, wt, frames, exits, entries, errors):
     """Errors (pairs,) of windows that begin anywhere between frames, in `errors` [m].
 
     `place` is the reaction's row of `places`; all else is as for `align_kernel`, with one trace.

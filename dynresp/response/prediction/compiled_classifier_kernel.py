@@ -37,7 +37,7 @@ _VECTOR = types.Array(types.float64, 1, "C", readonly=True)
 
 
 @njit(fastmath=_FASTMATH)
-def _project(features, projection, offset, reduced):  # type: ignore[no-untyped-def]
+def _project(features, projection, offset, reduced):
     """Principal components of some rows; index of the first row out of range, -1 if none is.
 
     NaN or infinity among the features reaches every component, be it by 0 * inf = NaN.
@@ -56,7 +56,7 @@ def _project(features, projection, offset, reduced):  # type: ignore[no-untyped-
 
 
 @njit
-def _expand(reduced, monomials):  # type: ignore[no-untyped-def]
+def _expand(reduced, monomials):
     """Monomials of the principal components of one row, without the padding."""
     components = len(reduced)
     monomials[0] = 1
@@ -72,14 +72,14 @@ def _expand(reduced, monomials):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _pair(first, second, classes):  # type: ignore[no-untyped-def]
+def _pair(first, second, classes):
     """Place of the pair of two classes, in either order, among all pairs."""
     low, high = min(first, second), max(first, second)
     return low * (2 * classes - low - 1) // 2 + high - low - 1
 
 
 @njit
-def _score(c, classes, decisions):  # type: ignore[no-untyped-def]
+def _score(c, classes, decisions):
     """Votes and bounded confidence of one class, added in scikit-learn's order."""
     votes, confidence = 0.0, 0.0
     for other in range(classes):
@@ -92,9 +92,7 @@ def _score(c, classes, decisions):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=_FASTMATH)
-def _next_best(  # type: ignore[no-untyped-def]
-    classes, weights, monomials, decisions, known, losses, scored, placed, scores
-):
+def _next_best(classes, weights, monomials, decisions, known, losses, scored, placed, scores):
     """The class of the highest score among those not placed; evaluates what that takes."""
     best = -1
     for c in range(classes):
@@ -147,7 +145,7 @@ def _next_best(  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=_FASTMATH)
-def _all_pairs(weights, monomials, decisions):  # type: ignore[no-untyped-def]
+def _all_pairs(weights, monomials, decisions):
     """Decisions of all pairs for some rows; each row of weights is read once."""
     for pair in range(len(weights)):
         for n in range(len(decisions)):
@@ -163,7 +161,7 @@ def _all_pairs(weights, monomials, decisions):  # type: ignore[no-untyped-def]
         for weights in (_ROWS, _SINGLE)
     ]
 )
-def rank_kernel(features, projection, offset, weights, classes, ranks):  # type: ignore[no-untyped-def]
+def rank_kernel(features, projection, offset, weights, classes, ranks):
     """Find the best classes of every row, evaluating only pairs that can matter.
 
     Args:
@@ -212,7 +210,7 @@ def rank_kernel(features, projection, offset, weights, classes, ranks):  # type:
         for weights, scalar in ((_ROWS, types.float64), (_SINGLE, types.float32))
     ]
 )
-def decision_kernel(features, projection, offset, weights, decisions):  # type: ignore[no-untyped-def]
+def decision_kernel(features, projection, offset, weights, decisions):
     """Evaluate all pairs of every row.
 
     Args:
@@ -244,7 +242,7 @@ def decision_kernel(features, projection, offset, weights, decisions):  # type: 
         for scalar in (types.float64, types.float32)
     ]
 )
-def score_kernel(classes, decisions, scores):  # type: ignore[no-untyped-def]
+def score_kernel(classes, decisions, scores):
     """Scores of all classes of every row, as scikit-learn's `decision_function` has them.
 
     Args:

@@ -27,7 +27,7 @@ _SMALL = 5e-7
 
 
 @njit(inline="always")
-def _multiply(a, b, out):  # type: ignore[no-untyped-def]
+def _multiply(a, b, out):
     """Hamilton product a b of quaternions w x y z."""
     w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
     x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
@@ -37,7 +37,7 @@ def _multiply(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _rotate(q, v, out):  # type: ignore[no-untyped-def]
+def _rotate(q, v, out):
     """A vector turned by a quaternion."""
     p = 2.0 * (q[2] * v[2] - q[3] * v[1])
     s = 2.0 * (q[3] * v[0] - q[1] * v[2])
@@ -49,7 +49,7 @@ def _rotate(q, v, out):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _write(cosine, sine, v, out, at):  # type: ignore[no-untyped-def]
+def _write(cosine, sine, v, out, at):
     """A vector as seen from the facing at contact."""
     out[at] = cosine * v[0] + sine * v[1]
     out[at + 1] = cosine * v[1] - sine * v[0]
@@ -57,9 +57,7 @@ def _write(cosine, sine, v, out, at):  # type: ignore[no-untyped-def]
 
 
 @compiled(_SIGNATURE)
-def features_kernel(  # type: ignore[no-untyped-def]
-    poses, velocities, frames, parents, offsets, centers, shares, chosen, features
-):
+def features_kernel(poses, velocities, frames, parents, offsets, centers, shares, chosen, features):
     """Write the features of hits.
 
     Args:

@@ -61,7 +61,7 @@ _FASTMATH = {"contract", "nnan", "nsz"}
 
 
 @njit(inline="always")
-def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):  # type: ignore[no-untyped-def]
+def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
     """Weighted difference of two states of a body."""
     x, y, z = ax - bx, ay - by, az - bz
     distance = math.sqrt(x * x + y * y + z * z)
@@ -74,7 +74,7 @@ def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
 
 
 @compiled(_SIGNATURE, fastmath=_FASTMATH)
-def search_kernel(  # type: ignore[no-untyped-def]
+def search_kernel(
     trace,
     exits,
     buffer,
