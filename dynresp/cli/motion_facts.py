@@ -15,6 +15,7 @@ from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.readers import read_motion_file
 from dynresp.motion.retargeting.retarget import t_pose_frames
 from dynresp.motion.retargeting.segments import find_segments
+from dynresp.support.runs import runs
 
 
 def facts(motion: Motion, file: Path | None, told: LoadOptions) -> dict[str, Any]:
@@ -67,5 +68,4 @@ def _file_facts(file: Path | None, told: LoadOptions) -> dict[str, Any] | None:
 
 def _ranges(flags: npt.NDArray[np.bool_], fps: float) -> list[list[float]]:
     """Spans of time [s] in which a flag is set, from its first frame to its last one's end."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [[float(start / fps), float(stop / fps)] for start, stop in edges.reshape(-1, 2)]
+    return [[start / fps, stop / fps] for start, stop in runs(flags)]

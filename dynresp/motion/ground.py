@@ -14,6 +14,7 @@ import numpy.typing as npt
 from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.runs import runs
 
 
 @dataclass(frozen=True)
@@ -117,11 +118,7 @@ def _without_short_runs(flags: npt.NDArray[np.bool_], shortest: int) -> npt.NDAr
     """Close gaps, then drop contacts, of fewer than `shortest` frames and not at the ends."""
     out = flags.copy()
     for value in (False, True):
-        edges = np.flatnonzero(np.diff(out.astype(np.int8)) != 0) + 1
-        starts = np.concatenate([[0], edges])
-        stops = np.concatenate([edges, [len(out)]])
-        inside = (starts > 0) & (stops < len(out))
-        for start, stop in zip(starts[inside], stops[inside], strict=True):
-            if out[start] == value and stop - start < shortest:
+        for start, stop in runs(out == value):
+            if start > 0 and stop < len(out) and stop - start < shortest:
                 out[start:stop] = not value
     return out

@@ -17,6 +17,7 @@ from dynresp.motion.feet import legs
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
 from dynresp.support.errors import UsageError
+from dynresp.support.runs import runs
 
 
 @dataclass(frozen=True)
@@ -204,9 +205,8 @@ class ReentryPlanner:
         database = self.graph.database
         leave, enter = (np.full(len(database), -1, dtype=np.int32) for _ in range(2))
         outside = np.diff(self.graph.offsets) == 0
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], outside, [False]]).astype(np.int8)))
-        for begin, end in edges.reshape(-1, 2):
-            for start, stop in _within_clips(database.clip_of, int(begin), int(end)):
+        for begin, end in runs(outside):
+            for start, stop in _within_clips(database.clip_of, begin, end):
                 rows = slice(start, stop)
                 seen = self.entries.nearest(
                     database.poses[rows],

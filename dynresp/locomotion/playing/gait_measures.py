@@ -23,6 +23,7 @@ from dynresp.motion.ground import foot_contacts, sole_points
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
+from dynresp.support.runs import runs
 
 # A foot that comes down again nearer to where it stood has not been moved [m].
 _MOVED_M = 0.05
@@ -75,9 +76,8 @@ def gait_of(motion: Motion, character: Character) -> Gait:
         turns = states.quaternions[:, body]
         middle = sole_points(character, side).mean(axis=0)
         soles = (states.positions[:, body] + rotations.rotate(turns, middle))[:, :2]
-        edges = np.flatnonzero(np.diff(np.pad(contacts[:, foot].astype(np.int8), 1)))
         last = np.full(2, np.inf)
-        for start, stop in edges.reshape(-1, 2):
+        for start, stop in runs(contacts[:, foot]):
             place = np.median(soles[start:stop], axis=0)
             if np.hypot(*(place - last)) >= _MOVED_M:
                 yaw = float(rotations.yaw_of(turns[(start + stop) // 2]))

@@ -21,8 +21,6 @@ from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.composition import Composition, at_rate, compose, standing
 from dynresp.locomotion.worlds.playground import Playground, recorded_playground
-from dynresp.locomotion.worlds.terrain_fitting import smoothed
-from dynresp.locomotion.worlds.terrain_graph import runs
 from dynresp.locomotion.worlds.world_contacts import PALM, palms
 from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
@@ -30,7 +28,9 @@ from dynresp.motion.feet import legs
 from dynresp.motion.feet.foot_fitting import FitConfig
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support import smoothing
 from dynresp.support.errors import UsageError
+from dynresp.support.runs import runs
 
 # A frame in the middle of a blend still tells a little where a hand holds.
 _LEAST_WEIGHT = 1e-3
@@ -327,7 +327,8 @@ def _root(
         config: How hands are fitted.
     """
     root = shifts.sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)[:, None]
-    root = smoothed(root, fps, config.follow_s)
+    half = max(1, round(0.5 * config.follow_s * fps))
+    root = smoothing.average(root, half)
     joints, reach = [], []
     for k, (upper, lower) in enumerate((("thigh", "shank"), ("upper_arm", "forearm"))):
         for i, side in enumerate(FEET):
@@ -340,6 +341,7 @@ def _root(
             reach.append(np.maximum(longest, played))
     away = tips + shifts - np.stack(joints, axis=1)
     far = np.stack(reach, axis=1)
+    half_draw = max(1, round(0.25 * config.follow_s * fps))
     for _ in range(_DRAWS):
         # What is not held goes with the root.
         way = away - weights[..., None] * root[:, None]
@@ -347,7 +349,7 @@ def _root(
         short = weights * np.maximum(length - far, 0.0) / np.maximum(length, 1e-9)
         if not (short > 0.0).any():
             break
-        root += smoothed((short[..., None] * way).sum(axis=1), fps, 0.5 * config.follow_s)
+        root += smoothing.average((short[..., None] * way).sum(axis=1), half_draw)
     return root
 
 

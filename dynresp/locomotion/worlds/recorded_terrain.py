@@ -24,6 +24,7 @@ from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.feet import legs
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support import smoothing
 from dynresp.support.arrays import LongArray
 from dynresp.support.errors import MotionError
 
@@ -285,11 +286,12 @@ def _settle(
         at = np.flatnonzero(contacts[:, foot])
         if len(at):
             shift[:, foot] -= np.interp(frames, at, above[at, foot])
-    rise = _smooth(shift.mean(axis=1), fps)
+    half = max(1, round(0.5 * _FOLLOW_S * fps))
+    rise = smoothing.average(shift.mean(axis=1), half)
     reach = (shift + _slack(character, states, ankles)).min(axis=1)
     beyond = np.maximum(rise - reach, 0.0)
-    window = 2 * round(0.5 * _FOLLOW_S * fps) + 1
-    rise -= _smooth(ndimage.maximum_filter1d(beyond, window, mode="nearest"), fps)
+    highest = ndimage.maximum_filter1d(beyond, 2 * half + 1, mode="nearest")
+    rise -= smoothing.average(highest, half)
     ankles[..., 2] += shift
     settled = np.array(poses)
     settled[:, 2] += rise
@@ -307,10 +309,3 @@ def _slack(character: Character, states: BodyStates, ankles: FloatArray) -> Floa
     across = np.linalg.norm(away[..., :2], axis=-1)
     down = np.sqrt(np.maximum(length**2 - across**2, 0.0))
     return np.maximum(down - away[..., 2], 0.0)
-
-
-def _smooth(values: FloatArray, fps: float) -> FloatArray:
-    """Averaged over the time in which the root follows the feet."""
-    half = max(1, round(0.5 * _FOLLOW_S * fps))
-    kernel = np.hanning(2 * half + 3)[1:-1]
-    return np.convolve(np.pad(values, half, mode="edge"), kernel / kernel.sum(), mode="valid")

@@ -16,7 +16,7 @@ import numpy as np
 
 from dynresp.locomotion.playing.composition import Composition, compose
 from dynresp.locomotion.worlds.terrain import Terrain
-from dynresp.locomotion.worlds.terrain_graph import TerrainGraph, runs
+from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.locomotion.worlds.terrain_walk import TerrainWalk
 from dynresp.locomotion.worlds.world_contacts import sole_corners
 from dynresp.motion import rotations
@@ -26,8 +26,10 @@ from dynresp.motion.feet.foot_fitting import FitConfig
 from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support import smoothing
 from dynresp.support.arrays import LongArray
 from dynresp.support.errors import UsageError
+from dynresp.support.runs import runs
 
 _FIT = FitConfig(farthest=0.4, deepest=0.12)
 
@@ -189,7 +191,7 @@ def _put_on_blocks(
             shift[rows, foot, 2] = top - soles[rows, foot, :, 2].min(axis=1)
         _pass_on(shift[:, foot], stances)
         _raise(terrain, soles[:, foot], shift[:, foot], stances, motion.fps, config)
-    root = smoothed(shift.mean(axis=1), motion.fps, config.follow_s)
+    root = smoothing.average(shift.mean(axis=1), max(1, round(0.5 * config.follow_s * motion.fps)))
     root[:, 2] -= _lowering(character, states, ankles + shift, root, motion.fps, config)
     poses = np.array(motion.poses)
     poses[:, :3] += root
@@ -264,7 +266,7 @@ def _raise(
     wanted = need + config.clear_m * rotations.ease(np.minimum(away / half, 1.0))
     wanted = np.where(stands, 0.0, np.maximum(wanted, 0.0))
     highest = ndimage.maximum_filter1d(wanted, 2 * half + 1, mode="nearest")
-    raised = smoothed(highest[:, None], fps, 2.0 * config.lift_s)[:, 0]
+    raised = smoothing.average(highest, half)
     shift[:, 2] += np.minimum(raised, config.climb * away / fps)
 
 
@@ -292,13 +294,4 @@ def _lowering(
         need = np.maximum(need, away[:, 2] - np.sqrt(np.maximum(reach**2 - across, 0.0)))
     half = max(1, round(0.5 * config.follow_s * fps))
     highest = ndimage.maximum_filter1d(need, 2 * half + 1, mode="nearest")
-    return smoothed(highest[:, None], fps, config.follow_s)[:, 0]
-
-
-def smoothed(values: FloatArray, fps: float, time_s: float) -> FloatArray:
-    """Values (n, columns) averaged over a time."""
-    half = max(1, round(0.5 * time_s * fps))
-    kernel = np.hanning(2 * half + 3)[1:-1]
-    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
-    columns = [np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T]
-    return np.stack(columns, axis=1)
+    return smoothing.average(highest, half)

@@ -18,6 +18,7 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import LongArray
 from dynresp.support.errors import MotionError, UsageError
+from dynresp.support.runs import runs
 
 # A sole is flat if its heel is no higher than its ball by this [m], and the other way round.
 _FLAT = 0.03
@@ -179,9 +180,3 @@ class TerrainGraph:
                 f"the graph has blocks of {config.block_m} and levels of {config.block_height_m} m,"
                 f" the terrain {terrain.block_m} and {terrain.level_m} m; they must be alike"
             )
-
-
-def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one past the last index of each run of flags (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -18,6 +18,7 @@ from dynresp.motion.ground import ContactConfig, sole_points
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
+from dynresp.support.runs import runs
 
 Ground: TypeAlias = Callable[[FloatArray], FloatArray]
 """Height [m] of the ground at points (..., 2): (...); not a number where there is none."""
@@ -123,7 +124,7 @@ def find_stances(corners: FloatArray, fps: float, config: StanceConfig | None = 
     found = [
         (foot, start, stop)
         for foot in range(2)
-        for start, stop in _runs(slow[:, foot])
+        for start, stop in runs(slow[:, foot])
         if stop - start >= config.shortest_s * fps
     ]
     feet, starts, stops = np.array(found, dtype=np.intp).reshape(-1, 3).T
@@ -184,9 +185,3 @@ def steady(flags: BoolArray, fps: float, gap_s: float) -> BoolArray:
     closed = ndimage.binary_closing(padded, window)
     opened: BoolArray = ndimage.binary_opening(closed, window)[2 * length : -2 * length]
     return opened
-
-
-def _runs(flags: BoolArray) -> list[tuple[int, int]]:
-    """First and one past the last index of each run of flags (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

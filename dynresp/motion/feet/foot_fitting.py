@@ -41,6 +41,7 @@ from dynresp.motion.feet.skating import TOUCH
 from dynresp.motion.ground import sole_points
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
+from dynresp.support import smoothing
 from dynresp.support.errors import MotionError, UsageError
 
 # Frames that are bent at a time, which saves memory.
@@ -267,10 +268,7 @@ def _lowering(
     if not need.any():
         return need
     half = _frames(config.root_s, fps)
-    padded = np.pad(np.minimum(need, config.deepest), 2 * half, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1).max(axis=1)
-    kernel = np.hanning(2 * half + 3)[1:-1]
-    lowered = np.convolve(highest, kernel / kernel.sum(), mode="valid")
+    lowered = smoothing.cover(np.minimum(need, config.deepest), half)
     for i in range(len(FEET)):
         way = ankles[i] - played.hips[i]
         way[:, 2] += lowered

@@ -15,6 +15,7 @@ from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.ground import sole_points
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.runs import runs
 
 TOUCH = 0.005
 """A corner touches that is at most this much higher than the sole's lowest [m]: a shoe gives, and
@@ -52,7 +53,6 @@ def foot_skates(motion: Motion, character: Character) -> list[float]:
     slides = foot_slides(character, character.kinematics(motion.poses))
     skates: list[float] = []
     for way, contact in zip(slides.T, motion.contacts.T, strict=True):
-        standing = np.concatenate([[False], contact[:-1] & contact[1:], [False]])
-        edges = np.flatnonzero(standing[1:] != standing[:-1])
-        skates += [float(way[a:b].sum()) for a, b in edges.reshape(-1, 2)]
+        standing = contact[:-1] & contact[1:]
+        skates += [float(way[start:stop].sum()) for start, stop in runs(standing)]
     return skates

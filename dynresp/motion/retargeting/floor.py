@@ -13,6 +13,7 @@ from dynresp.motion.feet import legs
 from dynresp.motion.ground import clearances, foot_contacts
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
+from dynresp.support import smoothing
 
 # Part of the heights that the floor is above: feet that stand higher (on a step, on their toes) are
 # more frequent than feet in the floor.
@@ -166,7 +167,8 @@ def _feet(character: Character) -> list[int]:
 def _lift(character: Character, low: FloatArray, fps: float, config: FloorConfig) -> FloatArray:
     """How far to raise the root in each frame (frames,) [m]."""
     others = np.setdiff1d(np.arange(low.shape[1]), _feet(character))
-    return _smooth_cover(np.maximum(0.0, -config.sink - low[:, others].min(axis=1)), fps, config)
+    need = np.maximum(0.0, -config.sink - low[:, others].min(axis=1))
+    return smoothing.cover(need, max(1, round(config.ramp_s * fps)))
 
 
 def _move(
@@ -220,12 +222,3 @@ def _ease_away(values: FloatArray, held: npt.NDArray[np.bool_], ramp: int) -> Fl
             eased = near * (1.0 - rotations.ease(away / ramp))
             out[order, column] = np.maximum(out[order, column], eased)
     return out
-
-
-def _smooth_cover(values: FloatArray, fps: float, config: FloorConfig) -> FloatArray:
-    """A smooth curve on or above the values: the highest within the ramp, then averaged over it."""
-    half = max(1, round(config.ramp_s * fps))
-    padded = np.pad(values, 2 * half, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1).max(axis=1)
-    kernel = np.hanning(2 * half + 3)[1:-1]
-    return np.convolve(highest, kernel / kernel.sum(), mode="valid")
