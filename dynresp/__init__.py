@@ -3,7 +3,7 @@
 The names listed in `__all__` are the stable Python interface. Everything else is private and may
 change with any version.
 
-Example:
+Examples:
     >>> import dynresp
     >>> ball = dynresp.Ball(time=1.5, mass=6, speed=8, from_deg=180)
     >>> response = dynresp.hit("builtin:walk", ball, library="builtin")

@@ -49,7 +49,7 @@ def load_motion(
         MissingMotionDataError: It is not on this machine.
         MotionFileError: The file cannot be read, or does not hold a person's motion.
 
-    Example:
+    Examples:
         >>> import dynresp
         >>> walk = dynresp.load_motion("builtin:walk")
         >>> len(walk), walk.fps

@@ -181,7 +181,7 @@ def hit(
         SimulationError: The simulation diverged.
         UsageError: An argument is wrong; the message says what was expected.
 
-    Example:
+    Examples:
         >>> import dynresp
         >>> ball = dynresp.Ball(time=1.5, mass=6, speed=8, from_deg=180)
         >>> response = dynresp.hit("builtin:walk", ball, library="builtin")

@@ -10,9 +10,10 @@ from dynresp.experiments.experiment_reader import parse_experiment
 from dynresp.experiments.runner import prepare_run, run_experiment
 
 ROOT = Path(__file__).parents[2]
+DOCUMENTS = ("docs/for_animators.md", "docs/experiments.md")
 EXAMPLES = [
     (document, text)
-    for document in ("README.md", "docs/experiments.md")
+    for document in DOCUMENTS
     for text in re.findall(
         r"^```toml\n(.*?)^```", (ROOT / document).read_text(encoding="utf-8"), re.M | re.S
     )
@@ -20,7 +21,10 @@ EXAMPLES = [
 
 
 def test_both_documents_show_one() -> None:
-    assert {document for document, _ in EXAMPLES} == {"README.md", "docs/experiments.md"}
+    assert {document for document, _ in EXAMPLES} == {
+        "docs/for_animators.md",
+        "docs/experiments.md",
+    }
 
 
 @pytest.mark.parametrize(("document", "text"), EXAMPLES, ids=[name for name, _ in EXAMPLES])
