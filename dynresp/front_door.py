@@ -13,13 +13,13 @@ from typing import Any, overload
 from dynresp.avatar_runs.graph_building import build_graph as build_from_spec
 from dynresp.avatar_runs.graph_spec import find_plan, read_plan
 from dynresp.experiments.experiment_reader import read_experiment
-from dynresp.experiments.named_motions import load_named_motion
 from dynresp.experiments.one_hit import HitResponse
 from dynresp.experiments.runner import Answer, Run, prepare_run, write_answers
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions
 from dynresp.motion.motion import Motion
+from dynresp.motion.named_motion import load_named_motion
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.support.progress import Progress, no_progress
 

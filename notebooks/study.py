@@ -23,12 +23,12 @@ from dynresp.datasets.dataset_reader import Dataset, load_dataset
 from dynresp.datasets.dataset_spec import DatasetPlan
 from dynresp.datasets.dataset_spec_reader import parse_plan
 from dynresp.datasets.sample_draws import Sample, draw_sample
-from dynresp.experiments.named_motions import take_library, take_motion
-from dynresp.experiments.response_settings import response_config
 from dynresp.learning.holdout import Split
 from dynresp.learning.training import TrainConfig, train
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
+from dynresp.motion.named_motion import take_motion
+from dynresp.motion.reactions.named_library import take_library
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.response.hit_simulation import HitStage
@@ -36,6 +36,7 @@ from dynresp.response.look_ahead import LookAhead, look_ahead_of
 from dynresp.response.prediction.classifier import Classifier, TrainedFor
 from dynresp.response.prediction.classifier_file import load_classifier, save_classifier
 from dynresp.response.response import ResponseConfig
+from dynresp.response.response_settings import response_config
 from dynresp.support.errors import UsageError
 from dynresp.support.paths import example_specs
 

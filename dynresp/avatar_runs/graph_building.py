@@ -11,18 +11,18 @@ from pathlib import Path, PurePosixPath
 
 from dynresp.avatar_runs.graph_spec import GraphPlan
 from dynresp.avatar_runs.world_setup import lay_out
-from dynresp.experiments.experiment_spec import MotionCut
-from dynresp.experiments.named_motions import BUILTIN_PREFIX, about_cut, find_motion, load_cut
 from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import builtin_names
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
+from dynresp.motion.named_motion import BUILTIN_PREFIX, about_cut, find_motion, load_cut
 from dynresp.motion.sources.motion_folders import (
     checked_relative_path,
     fits_pattern,
     list_motion_files,
 )
+from dynresp.specs.shared_tables import MotionCut
 from dynresp.support.errors import MissingMotionDataError, SpecError
 from dynresp.support.progress import Progress
 

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dynresp.experiments.experiment_spec import MotionCut, Strict
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.worlds.terrain import LEVEL_M
 from dynresp.motion.sources.collection import GRAPHS
-from dynresp.specs.toml_errors import Layout, read_toml, validate
+from dynresp.specs.shared_tables import MotionCut, Strict
+from dynresp.specs.toml_errors import Hints, read_spec
 from dynresp.specs.values import fixed
 from dynresp.support.errors import SpecError, UnknownNameError, UsageError
 from dynresp.support.paths import example_specs
@@ -75,9 +75,8 @@ class GraphPlan(Strict):
     leave_out: Annotated[list[str], Field(default_factory=list, max_length=1000)]
 
 
-_LAYOUT = Layout(
-    tables={(): GraphPlan, ("graph",): GraphTable, ("motion",): MotionCut},
-    hints={
+_HINTS = Hints(
+    missing={
         "graph": "add [graph] with name",
         "name": "say in a few words what the graph is of",
         "motion": 'add [[motion]] with motion = "builtin:walk", a path inside a motions folder, or '
@@ -125,8 +124,7 @@ def read_plan(path: Path | str) -> GraphPlan:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    content = read_toml(Path(path), "a graph plan")
-    plan = validate(GraphPlan, content, str(path), _LAYOUT)
+    plan = read_spec(GraphPlan, Path(path), "a graph plan", _HINTS)
     try:
         plan.graph.config()
     except UsageError as error:

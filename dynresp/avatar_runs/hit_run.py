@@ -10,8 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.avatar_runs.avatar_run import Outing, skate
-from dynresp.experiments.chooser import take_chooser
-from dynresp.experiments.experiment_spec import ChoiceTable
 from dynresp.locomotion.avatar.avatar import Avatar, Doing, Wanderer
 from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -22,6 +20,7 @@ from dynresp.motion.motion import Motion
 from dynresp.motion.reactions.reaction_library import default_library
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball
+from dynresp.response.chooser import ChoiceTable, take_chooser
 from dynresp.response.response import CARRY_ON, ResponseConfig
 from dynresp.response.runtime.dynamic_responder import Event, EventKind, Flight, Phase
 from dynresp.support.progress import Progress

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from dynresp.experiments.experiment_spec import Strict
 from dynresp.locomotion.worlds.obstacles import MOST_BOXES, Obstacle, World
-from dynresp.specs.toml_errors import Layout, read_toml, validate
+from dynresp.specs.shared_tables import Strict
+from dynresp.specs.toml_errors import Hints, read_spec
 from dynresp.specs.values import fixed, shown
 from dynresp.support.errors import SpecError, UsageError
 
@@ -51,10 +51,7 @@ class WorldFile(Strict):
     box: Annotated[list[BoxTable], Field(default_factory=list, max_length=MOST_BOXES)]
 
 
-_LAYOUT = Layout(
-    tables={(): WorldFile, ("world",): WorldTable, ("box",): BoxTable},
-    hints={"world": "add [world] with bounds"},
-)
+_HINTS = Hints(missing={"world": "add [world] with bounds"})
 
 
 def read_world(path: Path | str) -> World:
@@ -67,8 +64,7 @@ def read_world(path: Path | str) -> World:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    content = read_toml(Path(path), "a world file")
-    said = validate(WorldFile, content, str(path), _LAYOUT)
+    said = read_spec(WorldFile, Path(path), "a world file", _HINTS)
     try:
         boxes = [
             Obstacle(

@@ -13,7 +13,6 @@ import numpy as np
 
 from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult
-from dynresp.experiments.chooser import find_classifier
 from dynresp.experiments.experiment_reader import read_experiment
 from dynresp.experiments.runner import Run, prepare_run
 from dynresp.motion.reactions.reaction_library import builtin_library
@@ -21,6 +20,7 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.response.alignment.alignment import Aligner
 from dynresp.response.budget import BUDGETS, chooser_for
 from dynresp.response.choice import Chooser
+from dynresp.response.chooser import find_classifier
 from dynresp.response.hit_simulation import HitStage
 from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.prediction.classifier import Classifier

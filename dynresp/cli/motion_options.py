@@ -88,6 +88,6 @@ def load(name: str, motions: Path | None, told: LoadOptions) -> tuple[Motion, Pa
         MissingMotionDataError: It is nowhere.
         DynrespError: It cannot be read.
     """
-    from dynresp.experiments.named_motions import load_named_motion
+    from dynresp.motion.named_motion import load_named_motion
 
     return load_named_motion(name, motions, options=told)

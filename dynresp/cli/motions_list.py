@@ -14,8 +14,8 @@ def list_motions(motions: Motions = None, as_json: Json = False) -> None:
 
     The names are what experiments, `show` and `export` take.
     """
-    from dynresp.experiments.named_motions import BUILTIN_PREFIX
     from dynresp.motion.builtin import builtin_info, builtin_names
+    from dynresp.motion.named_motion import BUILTIN_PREFIX
     from dynresp.motion.sources.catalogue import load_sources
     from dynresp.motion.sources.motion_folders import list_motion_files, motion_folders
 

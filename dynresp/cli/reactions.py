@@ -35,8 +35,8 @@ def list_reactions(
 
     Without its motion capture on this machine, core is the built-in library.
     """
-    from dynresp.experiments.named_motions import about_library, take_library
     from dynresp.motion.character import default_character
+    from dynresp.motion.reactions.named_library import about_library, take_library
     from dynresp.motion.sources.motion_folders import motion_folders
 
     found = take_library(library, motion_folders(motions), Path(), 30.0, default_character())

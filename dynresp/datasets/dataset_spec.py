@@ -6,15 +6,9 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import BaseModel, Field, model_validator
 
-from dynresp.experiments.experiment_spec import (
-    BallTable,
-    BaseMotion,
-    LibraryTable,
-    PunchTable,
-    PushTable,
-    SettingsTable,
-    Strict,
-)
+from dynresp.physics.impact_spec import BallTable, PunchTable, PushTable
+from dynresp.response.response_settings import SettingsTable
+from dynresp.specs.shared_tables import BaseMotion, LibraryTable, Strict
 from dynresp.specs.values import Choice, Number, Uniform, fixed, number, shown, whole
 
 MAX_COUNT = 10_000_000

@@ -5,29 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
+from dynresp.datasets.dataset_spec import HIT, DatasetPlan
+from dynresp.specs.toml_errors import Hints, read_spec, validate
 
-from dynresp.datasets.dataset_spec import HIT, DatasetPlan, PlannedBase, PlannedImpact, PlanTable
-from dynresp.experiments import experiment_spec as spec
-from dynresp.specs.toml_errors import Layout, keys_of, read_toml, validate
-
-
-def _keys(hit: type[BaseModel]) -> list[str]:
-    """Keys that an impact of a plan may have."""
-    return [key for key in (*keys_of(hit), *keys_of(PlannedImpact)) if key not in ("time_s", HIT)]
-
-
-_LAYOUT = Layout(
-    tables={
-        (): DatasetPlan,
-        ("plan",): PlanTable,
-        ("base",): PlannedBase,
-        ("base", "or"): spec.MotionCut,
-        ("impact",): PlannedImpact,
-        ("library",): spec.LibraryTable,
-        ("settings",): spec.SettingsTable,
-    },
-    hints={
+_HINTS = Hints(
+    missing={
         "plan": "add [plan] with name and count",
         "base": 'add [[base]] with motion = "builtin:walk" or another motion',
         "impact": "add [[impact]] with kind",
@@ -35,12 +17,8 @@ _LAYOUT = Layout(
         "count": "say how many samples there shall be",
         "motion": 'give "builtin:walk", a path inside a motions folder, or a file',
     },
-    kinds={
-        "ball": _keys(spec.BallTable),
-        "punch": _keys(spec.PunchTable),
-        "push": _keys(spec.PushTable),
-    },
     inner=HIT,
+    hidden=("time_s",),
 )
 
 
@@ -57,8 +35,7 @@ def read_plan(path: Path | str) -> DatasetPlan:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    path = Path(path)
-    return parse_plan(read_toml(path, "a plan file"), str(path))
+    return read_spec(DatasetPlan, Path(path), "a plan file", _HINTS)
 
 
 def parse_plan(content: dict[str, Any], source: str = "plan") -> DatasetPlan:
@@ -71,4 +48,4 @@ def parse_plan(content: dict[str, Any], source: str = "plan") -> DatasetPlan:
     Raises:
         SpecError: It says something that is not allowed.
     """
-    return validate(DatasetPlan, content, source, _LAYOUT)
+    return validate(DatasetPlan, content, source, _HINTS)

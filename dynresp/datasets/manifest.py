@@ -11,11 +11,12 @@ from typing import Any
 
 from dynresp.datasets.dataset_spec import KINDS, DatasetPlan, plain
 from dynresp.datasets.shard_schema import PARAMETERS, SCHEMA_VERSION
-from dynresp.experiments.named_motions import Taken, about_library
-from dynresp.experiments.response_settings import in_force
 from dynresp.motion.character import Character
+from dynresp.motion.named_motion import Taken
+from dynresp.motion.reactions.named_library import about_library
 from dynresp.motion.reactions.reaction_library import MIRRORED, ReactionLibrary
 from dynresp.response.response import CARRY_ON, ResponseConfig
+from dynresp.response.response_settings import in_force
 from dynresp.results.result_json import versions
 from dynresp.support.files import replacing
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from dynresp.datasets.dataset_spec import DatasetPlan, PlannedImpact
-from dynresp.experiments.drawn_hits import draw_hits
-from dynresp.experiments.experiment_spec import PushTable
+from dynresp.physics.drawn_hits import draw_hits
+from dynresp.physics.impact_spec import PushTable
 from dynresp.physics.impacts import Impact, flight_s
 from dynresp.specs.values import Choice, Number, Uniform, draw
 from dynresp.support.errors import SpecError

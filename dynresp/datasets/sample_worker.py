@@ -12,10 +12,11 @@ from dynresp.datasets.manifest import differences, make_manifest, told
 from dynresp.datasets.sample_draws import check_durations, draw_sample
 from dynresp.datasets.shard_schema import columns, drawn, joined, labelled
 from dynresp.datasets.shards import Place, encode
-from dynresp.experiments.named_motions import take_library, take_motion
-from dynresp.experiments.response_settings import response_config
 from dynresp.motion.character import default_character
+from dynresp.motion.named_motion import take_motion
+from dynresp.motion.reactions.named_library import take_library
 from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.response.response_settings import response_config
 from dynresp.support.errors import DynrespError, MotionError, SpecError
 
 # Samples are labelled in bundles of this size, so that memory does not grow with a shard's.

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.experiments.drawn_hits import Hit
+from dynresp.experiments.response_record import OUTCOMES, outcome
+from dynresp.physics.drawn_hits import Hit
 from dynresp.response.response import Response
 from dynresp.response.response_quality import Quality
-from dynresp.results.result_json import OUTCOMES, outcome
 from dynresp.support.files import replacing
 
 FIGURES = tuple(item.name for item in fields(Quality))

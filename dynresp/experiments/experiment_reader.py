@@ -1,29 +1,15 @@
-"""Reading an experiment file, and saying in words what is wrong with it."""
+"""Reading an experiment file."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from dynresp.experiments import experiment_spec as spec
 from dynresp.experiments.experiment_spec import Experiment
-from dynresp.specs.toml_errors import Layout, keys_of, read_toml, validate
+from dynresp.specs.toml_errors import Hints, read_spec, validate
 
-_LAYOUT = Layout(
-    tables={
-        (): Experiment,
-        ("experiment",): spec.ExperimentTable,
-        ("base",): spec.BaseMotion,
-        ("base", "or"): spec.MotionCut,
-        ("impact",): spec.ImpactTable,
-        ("impact", "striker"): spec.Striker,
-        ("impact", "striker", "or"): spec.StrikerCut,
-        ("library",): spec.LibraryTable,
-        ("choice",): spec.ChoiceTable,
-        ("settings",): spec.SettingsTable,
-        ("output",): spec.OutputTable,
-    },
-    hints={
+_HINTS = Hints(
+    missing={
         "experiment": 'add [experiment] with name = "..."',
         "base": 'add [base] with motion = "builtin:walk" or another motion',
         "impact": "add [[impact]] with kind and time_s",
@@ -31,12 +17,6 @@ _LAYOUT = Layout(
         "motion": 'give "builtin:walk", a path inside a motions folder, or a file',
         "time_s": "say when it hits, in seconds from the start of the base motion",
         "hit_s": "say when the fist is to hit, in seconds from the start of the striker's motion",
-    },
-    kinds={
-        "ball": keys_of(spec.BallTable),
-        "punch": keys_of(spec.PunchTable),
-        "push": keys_of(spec.PushTable),
-        "strike": keys_of(spec.StrikeTable),
     },
 )
 
@@ -54,9 +34,8 @@ def read_experiment(path: Path | str) -> Experiment:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    path = Path(path)
     hint = ". `dynresp demo` shows one that works."
-    return parse_experiment(read_toml(path, "an experiment file", hint), str(path))
+    return read_spec(Experiment, Path(path), "an experiment file", _HINTS, hint)
 
 
 def parse_experiment(content: dict[str, Any], source: str = "experiment") -> Experiment:
@@ -69,4 +48,4 @@ def parse_experiment(content: dict[str, Any], source: str = "experiment") -> Exp
     Raises:
         SpecError: It says something that is not allowed.
     """
-    return validate(Experiment, content, source, _LAYOUT)
+    return validate(Experiment, content, source, _HINTS)

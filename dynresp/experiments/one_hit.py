@@ -10,22 +10,25 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from dynresp.experiments.chooser import take_chooser
-from dynresp.experiments.drawn_hits import Hit
-from dynresp.experiments.experiment_spec import Artefact, ChoiceTable, OutputTable
-from dynresp.experiments.named_motions import about_library, load_named_motion, take_library
+from dynresp.experiments.experiment_spec import OutputTable
 from dynresp.experiments.response_files import write_response
-from dynresp.experiments.response_settings import in_force
+from dynresp.experiments.response_record import outcome
 from dynresp.experiments.response_story import show as story_of
 from dynresp.motion.motion import Motion
+from dynresp.motion.named_motion import load_named_motion
+from dynresp.motion.reactions.named_library import about_library, take_library
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.physics.drawn_hits import Hit
 from dynresp.physics.impacts import Ball, Impact, Push, Strike
 from dynresp.response.budget import BUDGETS, Budget
+from dynresp.response.chooser import ChoiceTable, take_chooser
 from dynresp.response.responder import Responder
 from dynresp.response.response import Response
 from dynresp.response.response_quality import Quality, measure
-from dynresp.results.result_json import outcome, versions
+from dynresp.response.response_settings import in_force
+from dynresp.results.result_folder import Artefact
+from dynresp.results.result_json import versions
 from dynresp.support.errors import SimulationError, UnknownNameError, UsageError
 from dynresp.support.progress import Progress, no_progress
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, get_args
 
-from dynresp.experiments.drawn_hits import Hit
-from dynresp.experiments.experiment_spec import Artefact, OutputTable
+from dynresp.experiments.experiment_spec import OutputTable
+from dynresp.experiments.response_record import describe, outcome
 from dynresp.experiments.response_story import show
 from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
+from dynresp.physics.drawn_hits import Hit
 from dynresp.physics.impacts import Strike
 from dynresp.response.alignment.error_surface import landscape
 from dynresp.response.response import Response, ResponseConfig
@@ -17,10 +18,11 @@ from dynresp.response.response_quality import Quality
 from dynresp.results.result_folder import (
     RESULT,
     WRITTEN,
+    Artefact,
     NothingToShowError,
     clear_response,
 )
-from dynresp.results.result_json import describe, outcome, write_json
+from dynresp.results.result_json import write_json
 from dynresp.results.story_files import story_writers, write_files
 from dynresp.support.progress import Progress
 

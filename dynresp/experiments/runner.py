@@ -10,19 +10,21 @@ from typing import Any
 import numpy as np
 
 from dynresp.experiments import batch_summary as batch
-from dynresp.experiments.chooser import Choosing, take_chooser
-from dynresp.experiments.drawn_hits import Hit, draw_hits
-from dynresp.experiments.experiment_spec import Experiment, StrikerCut, StrikeTable
-from dynresp.experiments.named_motions import Taken, about_library, take_library, take_motion
+from dynresp.experiments.experiment_spec import Experiment
 from dynresp.experiments.response_files import write_response
-from dynresp.experiments.response_settings import in_force, response_config
 from dynresp.motion.character import Character, default_character
+from dynresp.motion.named_motion import Taken, take_motion
+from dynresp.motion.reactions.named_library import about_library, take_library
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
+from dynresp.physics.drawn_hits import Hit, draw_hits
+from dynresp.physics.impact_spec import StrikerCut, StrikeTable
 from dynresp.physics.impacts import Ball, prepare
+from dynresp.response.chooser import Choosing, take_chooser
 from dynresp.response.responder import Responder
 from dynresp.response.response import Response, ResponseConfig
 from dynresp.response.response_quality import Quality, measure
+from dynresp.response.response_settings import in_force, response_config
 from dynresp.results.result_folder import (
     RESULT,
     SUMMARY,

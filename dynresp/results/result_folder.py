@@ -9,10 +9,19 @@ import re
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
-from dynresp.experiments.experiment_spec import Artefact
 from dynresp.support.errors import DynrespError, MissingExtraError
+
+Artefact = Literal[
+    "motion.npz",
+    "motion.bvh",
+    "recording.html",
+    "filmstrip.png",
+    "alignment.png",
+    "video.mp4",
+]
+"""What can be written for each response, besides `result.json`."""
 
 PLAN, OPTIONS, WATCHING = "plan.png", "options.png", "watching.png"
 """Pictures of a way through a motion graph, of the actions offered, of the video followed."""

@@ -1,23 +1,24 @@
-"""Reading TOML files with bounds, and saying in words what is wrong with them."""
+"""What is wrong with the content of a TOML file, in words: where, what was given, what is allowed.
+
+A pydantic model says what a file may hold; this is the one translator of pydantic's errors.
+"""
 
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from dynresp.specs.toml_reader import read_toml
 from dynresp.specs.values import shown
 from dynresp.support.errors import SpecError
 
-MAX_FILE_BYTES = 1 << 20
-"""Largest file that is read [bytes]."""
-
-_LISTED_MISTAKES = 8
+# Most errors that one message lists.
+_LISTED = 8
 _TYPES = {
     "string_type": "text in quotes",
     "bool_type": "true or false",
@@ -31,92 +32,139 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 @dataclass(frozen=True)
-class Layout:
-    """What a kind of file may hold, as far as words for its mistakes need it.
+class Hints:
+    """What a kind of file needs for the words about its errors, beside its model.
 
     Attributes:
-        tables: What each table may hold, by the keys that lead to it; () is the file itself.
-        hints: By key, what to do where it is missing.
-        kinds: By kind of impact, the keys that an `[[impact]]` of it may have.
-        inner: Name of the field, which no file knows, that holds what the kinds differ in.
+        missing: By key, what to do where it is missing.
+        inner: A field of the model that stands for keys of the table around it; files do not
+            have it.
+        hidden: Keys of the model that files do not have either.
     """
 
-    tables: Mapping[tuple[str, ...], type[BaseModel]]
-    hints: Mapping[str, str]
-    kinds: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    missing: Mapping[str, str] = field(default_factory=dict)
     inner: str = ""
+    hidden: Sequence[str] = ()
 
 
-def read_toml(path: Path, what: str, hint: str = "") -> dict[str, Any]:
-    """Read a TOML file.
+def read_spec(
+    model: type[Model], path: Path, what: str, hints: Hints, otherwise: str = ""
+) -> Model:
+    """Read and check a spec file.
 
     Args:
+        model: What it must be.
         path: The file.
         what: What it is, with an article, such as "an experiment file".
-        hint: A sentence for those who named no such file.
+        hints: For the words about its errors.
+        otherwise: A sentence for somebody who named no such file.
 
     Raises:
-        SpecError: It cannot be read, is too large or not TOML. The message names the file.
+        SpecError: It cannot be read, is too large or not TOML, or says something that is not
+            allowed. The message names the file, the key, what was given and what is allowed.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        why = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-        raise SpecError(f"{path}: {why}; expected {what} (.toml)" + hint) from None
-    if len(data) > MAX_FILE_BYTES:
-        name = what.partition(" ")[2]
-        raise SpecError(f"{path} is larger than {MAX_FILE_BYTES // 1024} KiB; no {name} is")
-    try:
-        return tomllib.loads(data.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise SpecError(f"{path} is not text in UTF-8 (byte {error.start})") from None
-    # Brackets nested deep enough exhaust the parser's stack.
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise SpecError(f"{path} is not valid TOML: {error}") from None
+    return validate(model, read_toml(path, what, otherwise), str(path), hints)
 
 
-def validate(model: type[Model], content: dict[str, Any], source: str, layout: Layout) -> Model:
+def validate(model: type[Model], content: dict[str, Any], source: str, hints: Hints) -> Model:
     """Check the content of a file.
 
     Args:
         model: What it must be.
         content: What it says, as `tomllib` gives it.
         source: Name of the file, for messages.
-        layout: What it may hold.
+        hints: For the words about its errors.
 
     Raises:
-        SpecError: It says something that is not allowed; the message lists the first mistakes.
+        SpecError: It says something that is not allowed; the message lists the first errors.
     """
     try:
         return model.model_validate(content)
     except ValidationError as error:
         found = [dict(item) for item in error.errors()]
-        # Of a list with wrong tables in it only the right ones are counted; that says nothing new.
-        found = [item for item in found if not _miscounted(item)]
-        mistakes = [_explain(item, content, layout) for item in found]
-    more = len(mistakes) - _LISTED_MISTAKES
-    lines = [f"{source}:", *mistakes[:_LISTED_MISTAKES]]
-    lines += [f"and {more} more"] if more > 0 else []
+    # Of a list with wrong tables in it pydantic counts only the right ones; that says nothing new.
+    lines = [_explain(item, model, content, hints) for item in found if not _miscounted(item)]
+    more = len(lines) - _LISTED
+    lines = [f"{source}:", *lines[:_LISTED], *([f"and {more} more"] if more > 0 else [])]
     raise SpecError("\n  ".join(lines) if len(lines) > 2 else " ".join(lines))
 
 
-def _explain(error: dict[str, Any], content: dict[str, Any], layout: Layout) -> str:
-    """One of pydantic's errors in words: where, what was given, what is allowed."""
-    place, impact = _place(error["loc"], layout)
-    where = _where(place, content)
-    keys = [part for part in place if isinstance(part, str)]
+@dataclass(frozen=True)
+class _Place:
+    """Where an error is in the file.
+
+    Attributes:
+        keys: The keys and numbers that lead there, without what only the model has.
+        around: The tables, one inside the other, that hold the last key; several where the keys
+            of one stand in the other (`Hints.inner`).
+        inside: The tables that can stand there.
+        kind: The kind of the innermost table around it that comes in several kinds.
+    """
+
+    keys: list[int | str]
+    around: list[type[BaseModel]]
+    inside: list[type[BaseModel]]
+    kind: str | None
+
+
+def _place(model: type[BaseModel], location: Sequence[int | str], hints: Hints) -> _Place:
+    keys: list[int | str] = []
+    around: list[type[BaseModel]] = [model]
+    outer: list[type[BaseModel]] = []
+    inside: list[type[BaseModel]] = [model]
+    kind: str | None = None
+    inside_kind: str | None = None
+    for part in location:
+        if isinstance(part, int):
+            keys.append(part)
+            continue
+        of_kind = [table for table in inside if part in _kinds(table)]
+        if len(inside) > 1 and of_kind:
+            inside, inside_kind = of_kind, part
+            continue
+        around, outer = [*inside, *outer], []
+        kind, inside_kind = inside_kind, None
+        held = [f for t in inside for name, f in t.model_fields.items() if part in (f.alias, name)]
+        if part == hints.inner and held:
+            outer = around
+        else:
+            keys.append(part)
+        inside = _tables_in(held[0].annotation) if held else []
+    return _Place(keys, around, inside, kind)
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    """The tables that a field of this type can hold."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for inner in get_args(annotation) for table in _tables_in(inner)]
+
+
+def _kinds(table: type[BaseModel]) -> list[str]:
+    """The words by which a table of several kinds says which one it is."""
+    annotations = [item.annotation for item in table.model_fields.values() if item.is_required()]
+    return [word for a in annotations if get_origin(a) is Literal for word in get_args(a)]
+
+
+def _explain(
+    error: dict[str, Any], model: type[BaseModel], content: dict[str, Any], hints: Hints
+) -> str:
+    place = _place(model, error["loc"], hints)
+    where = _where(place.keys, content)
     if error["type"] == "extra_forbidden":
-        table = tuple(keys[:-1])
-        if impact and table == ("impact",):
-            what = f"[[impact]] of kind {impact!r}"
-            return _unknown_key(where, what, layout.kinds[impact])
-        what = f"[{'.'.join(table)}]" if table else "the file"
-        return _unknown_key(where, what, keys_of(layout.tables[table]))
+        keys = [part for part in place.keys if isinstance(part, str)]
+        table = ".".join(keys[:-1])
+        what = f"[{table}]" if table else "the file"
+        if place.kind:
+            what = f"[{what}] of kind {place.kind!r}"
+        names = [key for table in place.around for key in keys_of(table)]
+        return _unknown_key(
+            where, what, [n for n in names if n != hints.inner and n not in hints.hidden]
+        )
     if error["type"] == "missing":
-        needed = "this kind of impact needs it" if impact else "it is needed here"
-        return f"{where} is missing; {layout.hints.get(keys[-1], needed)}"
-    return _explain_value(error, where, tuple(keys) in layout.tables, list(layout.kinds))
+        needed = "this kind of table needs it" if place.kind else "it is needed here"
+        return f"{where} is missing; {hints.missing.get(str(place.keys[-1]), needed)}"
+    return _explain_value(error, where, place.inside)
 
 
 def _miscounted(error: dict[str, Any]) -> bool:
@@ -124,48 +172,41 @@ def _miscounted(error: dict[str, Any]) -> bool:
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
-def _place(location: Sequence[int | str], layout: Layout) -> tuple[list[int | str], str | None]:
-    """Where a mistake is in the file, without what only the model has; and the impact's kind."""
-    place = list(location)
-    if place[:1] != ["impact"]:
-        return place, None
-    if layout.inner and place[2:3] == [layout.inner]:
-        del place[2]
-    if place[2:3] and place[2] in layout.kinds:
-        return [*place[:2], *place[3:]], str(place[2])
-    return place, None
-
-
-def _where(place: list[int | str], content: dict[str, Any]) -> str:
+def _where(keys: list[int | str], content: dict[str, Any]) -> str:
     """A place in words; a table is numbered where there are several of its name."""
     words: list[str] = []
-    for part in place:
+    held: Any = content
+    for part in keys:
         if isinstance(part, str):
             words.append(part)
-        elif isinstance(content.get(words[-1]), list) and len(content[words[-1]]) > 1:
-            words[-1] += f" {part + 1}"
+            held = held.get(part) if isinstance(held, dict) else None
+        else:
+            if isinstance(held, list) and len(held) > 1:
+                words[-1] += f" {part + 1}"
+            held = held[part] if isinstance(held, list) and part < len(held) else None
     return ".".join(words)
 
 
-def _explain_value(error: dict[str, Any], where: str, table: bool, kinds: list[str]) -> str:
-    """A mistake that is no unknown and no missing key, in words.
+def _explain_value(error: dict[str, Any], where: str, tables: list[type[BaseModel]]) -> str:
+    """An error other than an unknown or a missing key, in words.
 
     Args:
         error: One of pydantic's.
         where: Its place in the file.
-        table: Whether a table belongs there, or a list of them.
-        kinds: The kinds of impacts that there can be.
+        tables: The tables, of one or several kinds, that belong there; or lists of them.
     """
     kind, given, context = error["type"], error["input"], error.get("ctx", {})
-    if kind == "union_tag_not_found":
-        return f"{where}.kind is missing; expected one of {', '.join(kinds)}"
-    if kind == "union_tag_invalid":
+    if kind in ("union_tag_not_found", "union_tag_invalid"):
+        kinds = [word for table in tables for word in _kinds(table)]
+        where += "." + str(context["discriminator"]).strip("'")
+        if kind == "union_tag_not_found":
+            return f"{where} is missing; expected one of {', '.join(kinds)}"
         tag = str(context.get("tag"))
-        return f"{where}.kind: expected one of {', '.join(kinds)}, got {tag!r}{near(tag, kinds)}"
+        return f"{where}: expected one of {', '.join(kinds)}, got {tag!r}{near(tag, kinds)}"
     if kind == "value_error":
-        said = str(error["msg"]).removeprefix("Value error, ")
-        return f"{where}: {said}" if where else said
-    if kind in ("list_type", "tuple_type") and table:
+        message = str(error["msg"]).removeprefix("Value error, ")
+        return f"{where}: {message}" if where else message
+    if kind in ("list_type", "tuple_type") and tables:
         if isinstance(given, dict):
             return f"{where}: write [[{where}]], with two brackets on each side"
         return f"{where}: expected tables [[{where}]], got {shown(given)}"
@@ -175,8 +216,8 @@ def _explain_value(error: dict[str, Any], where: str, table: bool, kinds: list[s
         return f"{where}: expected at most {context['max_length']} characters, got {len(given)}"
     if kind in ("too_short", "too_long"):
         bound = context["min_length"] if kind == "too_short" else context["max_length"]
-        what = "table" if table else "item"
-        what += ("" if bound == 1 else "s") + (f" [[{where}]]" if table else "")
+        what = "table" if tables else "item"
+        what += ("" if bound == 1 else "s") + (f" [[{where}]]" if tables else "")
         least = "least" if kind == "too_short" else "most"
         return f"{where}: expected at {least} {bound} {what}, got {len(given)}"
     if kind == "literal_error":
@@ -194,7 +235,7 @@ def _unknown_key(where: str, what: str, allowed: Iterable[str]) -> str:
 
 def keys_of(model: type[BaseModel]) -> list[str]:
     """Keys that a table may have."""
-    return [field.alias or name for name, field in model.model_fields.items()]
+    return [item.alias or name for name, item in model.model_fields.items()]
 
 
 def near(given: str, allowed: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ import pytest
 
 from dynresp.datasets.dataset_spec import DatasetPlan, plain
 from dynresp.datasets.dataset_spec_reader import parse_plan, read_plan
-from dynresp.specs.toml_errors import MAX_FILE_BYTES
+from dynresp.specs.toml_reader import MAX_FILE_BYTES
 from dynresp.specs.values import Choice, Uniform
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import example_specs

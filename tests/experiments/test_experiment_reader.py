@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from dynresp.experiments.experiment_reader import parse_experiment, read_experiment
-from dynresp.specs.toml_errors import MAX_FILE_BYTES
+from dynresp.specs.toml_reader import MAX_FILE_BYTES
 from dynresp.specs.values import Choice, Uniform
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import example_specs

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from dynresp.experiments.experiment_reader import read_experiment
-from dynresp.experiments.experiment_spec import SettingsTable
-from dynresp.experiments.response_settings import in_force, response_config
 from dynresp.experiments.runner import chosen_hits, prepare_run, run_experiment
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers.npz import read_npz
+from dynresp.response.response_settings import SettingsTable, in_force, response_config
 from dynresp.results.result_json import to_json
 from dynresp.support.errors import DynrespError, MissingMotionDataError, SpecError, UnknownNameError
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from dynresp.experiments.chooser import find_classifier
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
@@ -11,6 +10,7 @@ from dynresp.motion.reactions.reaction_library import builtin_library
 from dynresp.physics.impacts import Ball, Impact
 from dynresp.response.alignment.error_surface import landscape
 from dynresp.response.budget import chooser_for
+from dynresp.response.chooser import find_classifier
 from dynresp.response.responder import Responder
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.transition.transition import place_on

@@ -3,13 +3,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from dynresp.experiments.drawn_hits import draw_hits
 from dynresp.experiments.experiment_reader import parse_experiment
-from dynresp.experiments.experiment_spec import ImpactTable
 from dynresp.motion.character import Character
+from dynresp.physics.drawn_hits import draw_hits
+from dynresp.physics.impact_spec import ImpactTable
 from dynresp.physics.impacts import Ball, Punch, Push, Strike
-
-from .samples import swaying
+from tests.experiments.samples import swaying
 
 
 def table(text: str) -> ImpactTable:

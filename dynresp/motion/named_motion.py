@@ -9,24 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dynresp.experiments.experiment_spec import MotionCut
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
-from dynresp.motion.reactions.reaction_library import (
-    BUILTIN,
-    ReactionLibrary,
-    default_library,
-    load_library,
-)
 from dynresp.motion.sources.catalogue import load_licences, load_sources
 from dynresp.motion.sources.motion_folders import find_motion_file, motion_folders
+from dynresp.specs.shared_tables import MotionCut
 from dynresp.support.errors import (
     MissingMotionDataError,
     MotionFileError,
     SpecError,
-    UnknownNameError,
 )
 from dynresp.support.paths import expanded
 
@@ -214,45 +207,4 @@ def about_cut(cut: MotionCut, found: Path | str) -> dict[str, Any]:
     if source is not None and source.sha256 == about["sha256"]:
         about["credit"] = load_licences()[source.source_repo].credit
         about["licence"] = source.licence
-    return about
-
-
-def take_library(
-    which: str, folders: Sequence[Path], beside: Path, fps: float, character: Character
-) -> ReactionLibrary:
-    """Load the reactions that an experiment chooses from.
-
-    Args:
-        which: "core", "full", "builtin", or a library file (.toml). For want of the motion capture
-            of "core" it is the built-in library.
-        folders: Motions folders.
-        beside: Folder of the experiment file, from which a relative path counts.
-        fps: Frame rate of the reactions [1/s].
-        character: The character.
-
-    Raises:
-        UnknownNameError: There is no such library.
-        MissingMotionDataError: Its motion files are not on this machine.
-        SpecError: The library file is wrong.
-    """
-    if which == "core":
-        return default_library(folders, character, fps)
-    if which in ("full", BUILTIN):
-        return load_library(which, folders, character, fps)
-    if not which.endswith(".toml"):
-        names = ("core", "full", BUILTIN, "a library file (.toml)")
-        raise UnknownNameError("library", which, names)
-    return load_library(beside / expanded(which, "library"), folders, character, fps)
-
-
-def about_library(library: ReactionLibrary, which: str) -> dict[str, Any]:
-    """What `result.json` says of the library."""
-    about: dict[str, Any] = {
-        "name": library.name,
-        "identity": library.identity,
-        "reactions": len(library.reactions),
-        "built_in": all(reaction.builtin for reaction in library.reactions),
-    }
-    if which == "core" and library.name == BUILTIN:
-        about["instead_of"] = which
     return about

@@ -4,22 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from dynresp.experiments.experiment_spec import ChoiceTable
-from dynresp.experiments.response_settings import in_force
+from pydantic import Field
+
 from dynresp.motion.character import Character
 from dynresp.motion.reactions.reaction_library import BUILTIN, RECORDED, ReactionLibrary
-from dynresp.response.budget import chooser_for
+from dynresp.response.budget import Budget, chooser_for
 from dynresp.response.choice import Chooser
 from dynresp.response.prediction.classifier import Classifier, ClassifierError, TrainedFor
 from dynresp.response.prediction.classifier_file import load_classifier
 from dynresp.response.response import ResponseConfig
+from dynresp.response.response_settings import in_force
+from dynresp.specs.shared_tables import Strict
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import classifier_file, expanded, models_folder
 
 SHIPPED = (BUILTIN, *RECORDED)
 """Names of the libraries for which a classifier is shipped."""
+
+
+class ChoiceTable(Strict):
+    """`[choice]`: how much is spent on choosing, and with which classifier."""
+
+    budget: Budget = "fast"
+    classifier: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.experiments.experiment_spec import (
-    BallTable,
-    ImpactTable,
-    PunchTable,
-    PushTable,
-    StrikeTable,
-)
 from dynresp.motion.motion import Motion
+from dynresp.physics.impact_spec import BallTable, ImpactTable, PunchTable, PushTable, StrikeTable
 from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
 from dynresp.specs.values import draw
 

@@ -4,11 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any
+from typing import Annotated, Any
 
-from dynresp.experiments.experiment_spec import SettingsTable
 from dynresp.response.response import ResponseConfig
+from dynresp.specs.shared_tables import Strict
+from dynresp.specs.values import fixed, whole
 from dynresp.support.errors import SpecError, UsageError
+
+
+class SettingsTable(Strict):
+    """`[settings]`: how simulation, search and blend run; what is left out keeps its default."""
+
+    blend_s: Annotated[float | None, fixed(0.05, 2.0, "s")] = None
+    second_pass: bool | None = None
+    # The shortest reactions of the full library last a little longer.
+    window_s: Annotated[float | None, fixed(0.05, 0.8, "s")] = None
+    exit_min_s: Annotated[float | None, fixed(0.0, 3.0, "s")] = None
+    exit_max_s: Annotated[float | None, fixed(0.0, 3.0, "s")] = None
+    entry_step_s: Annotated[float | None, fixed(0.01, 1.0, "s")] = None
+    entry_max_s: Annotated[float | None, fixed(0.0, 60.0, "s")] = None
+    graze_speed_m_s: Annotated[float | None, fixed(0.0, 10.0, "m/s")] = None
+    carry_on_max_error_m: Annotated[float | None, fixed(0.0, 100.0, "m")] = None
+    carry_on_s: Annotated[float | None, fixed(0.0, 60.0, "s")] = None
+    remaining_s: Annotated[float | None, fixed(0.0, 60.0, "s")] = None
+    substeps: Annotated[int | None, whole(4, 100)] = None
+
 
 # Where each key goes: the part of `ResponseConfig`, "" for the whole, and the name there.
 _PLACES = {

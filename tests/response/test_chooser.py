@@ -6,9 +6,7 @@ from typing import Any
 
 import pytest
 
-from dynresp.experiments.chooser import SHIPPED, find_classifier, shipped_classifier
 from dynresp.experiments.experiment_reader import parse_experiment
-from dynresp.experiments.response_settings import in_force
 from dynresp.experiments.runner import Run, prepare_run
 from dynresp.motion.character import Character
 from dynresp.motion.reactions.reaction_library import (
@@ -17,10 +15,12 @@ from dynresp.motion.reactions.reaction_library import (
     builtin_library,
     load_library,
 )
+from dynresp.response.chooser import SHIPPED, find_classifier, shipped_classifier
 from dynresp.response.prediction.classifier import ClassifierError
 from dynresp.response.prediction.classifier_choice import ClassifierChooser
 from dynresp.response.prediction.classifier_file import load_classifier, load_pipelines
 from dynresp.response.response import CARRY_ON, ResponseConfig
+from dynresp.response.response_settings import in_force
 from dynresp.response.search.full_search_choice import OracleChooser
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import classifier_file
@@ -87,7 +87,7 @@ def test_the_oracle_chooses_on_request(tmp_path: Path) -> None:
 
 
 def test_and_for_want_of_a_classifier(tmp_path: Path, character: Character) -> None:
-    from .samples import write_world
+    from tests.experiments.samples import write_world
 
     file = write_world(tmp_path, character)
     from dynresp.experiments.experiment_reader import read_experiment
