@@ -8,7 +8,7 @@ from dynresp.motion import rotations
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.feet import legs
-from dynresp.motion.feet.foot_fitting import Composed
+from dynresp.motion.feet.foot_fitting import ComposedMotion
 from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET, Motion, move_poses
@@ -39,7 +39,7 @@ def drifting(character: Character, rng: np.random.Generator, seconds: float = 6.
     return Motion(poses, FPS, "drifting", motion.contacts)
 
 
-def jumping(character: Character, rng: np.random.Generator, cuts: int = 1) -> Composed:
+def jumping(character: Character, rng: np.random.Generator, cuts: int = 1) -> ComposedMotion:
     """A walk that is left and entered elsewhere, each time turned and shifted a little.
 
     What differs fades over the blend, blends overlap where there are several cuts.
@@ -82,7 +82,7 @@ def jumping(character: Character, rng: np.random.Generator, cuts: int = 1) -> Co
         )
         residual = (here[ROOT] - there[ROOT], rotations.to_rotation_vector(off))
         at, since = entry, 1
-    return Composed(
+    return ComposedMotion(
         np.concatenate(poses), np.concatenate(source), np.concatenate(contacts), jumps, FPS, BLEND_S
     )
 
@@ -120,8 +120,8 @@ def same_poses(a: FloatArray, b: FloatArray, atol: float) -> None:
     np.testing.assert_allclose(turns, 0.0, atol=10.0 * atol)
 
 
-def unjumped(motion: Motion, fitted: FloatArray | None = None) -> Composed:
-    return Composed(motion.poses, motion.poses, motion.contacts, [], FPS, BLEND_S, fitted)
+def unjumped(motion: Motion, fitted: FloatArray | None = None) -> ComposedMotion:
+    return ComposedMotion(motion.poses, motion.poses, motion.contacts, [], FPS, BLEND_S, fitted)
 
 
 def crouched(character: Character, poses: FloatArray, depth: float = 0.08) -> FloatArray:
@@ -134,7 +134,7 @@ def crouched(character: Character, poses: FloatArray, depth: float = 0.08) -> Fl
 
 def standing_over(
     character: Character, way: float, crouch: float = 0.08
-) -> tuple[Composed, FloatArray]:
+) -> tuple[ComposedMotion, FloatArray]:
     """Somebody who stands through a whole blend onto one who stands elsewhere, then lifts a foot.
 
     Returns:
@@ -150,13 +150,13 @@ def standing_over(
     source = np.concatenate([poses[:jump], moved[jump:]])
     contacts = np.ones((len(poses), 2), dtype=bool)
     contacts[90:100, 0] = False
-    composed = Composed(played, source, contacts, [jump], FPS, blend / FPS)
+    composed = ComposedMotion(played, source, contacts, [jump], FPS, blend / FPS)
     contacts = contacts.copy()
     contacts[90:, 0] = False
     return replace(composed, contacts=contacts), foot_states(character, poses[:1])[0][0]
 
 
-def dragged(character: Character, way: float) -> Composed:
+def dragged(character: Character, way: float) -> ComposedMotion:
     """Somebody who stands on one leg, then on the other, which two blends carry on by a way each.
 
     The body stays; the second stance lasts 0.7 s, both blends reach beyond its end.
@@ -172,7 +172,7 @@ def dragged(character: Character, way: float) -> Composed:
         since = np.arange(n) - jump
         played[:, 0, 0] += way * (rotations.ease(since / blend) - rotations.ease((since - 30) / 20))
         source[:, 0, 0] += way * ((since >= 0) - rotations.ease((since - 30) / 20))
-    return Composed(
+    return ComposedMotion(
         legs.place_ankles(character, poses, played), legs.place_ankles(character, poses, source),
         contacts, jumps, FPS, blend / FPS,
     )  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
-from dynresp.motion.feet.foot_fitting import FitConfig
+from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP
 from dynresp.motion.motion import Motion
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.rotations import FloatArray
@@ -246,6 +246,6 @@ def _same_but_for_the_legs(shown: FloatArray, placed: FloatArray) -> None:
     np.testing.assert_allclose(shown[:, :2], placed[:, :2], atol=1e-7)
     lowered = placed[:, 2] - shown[:, 2]
     assert lowered.min() > -1e-7
-    assert lowered.max() <= FitConfig().deepest + 1e-7
+    assert lowered.max() <= MAX_ROOT_DROP + 1e-7
     ours, theirs = (x[:, 3:].reshape(len(x), 14, 4)[:, :8] for x in (shown, placed))
     np.testing.assert_allclose(rotations.angle_between(ours, theirs), 0.0, atol=1e-6)

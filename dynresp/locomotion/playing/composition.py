@@ -13,7 +13,7 @@ from dynresp.locomotion.graph.placement import IDENTITY
 from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
 from dynresp.locomotion.playing.stance_steps import stand_between
 from dynresp.motion.character import POSE_SIZE, Character
-from dynresp.motion.feet.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP, ComposedMotion, fit_feet
 from dynresp.motion.motion import Motion, interpolate_moving
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray, IntArray
@@ -54,8 +54,8 @@ def compose(
     frames: npt.ArrayLike,
     place: npt.ArrayLike = IDENTITY,
     fps: float | None = None,
-    fit: FitConfig | None = None,
     ground: FloatArray | None = None,
+    max_root_drop: float = MAX_ROOT_DROP,
 ) -> Composition:
     """Play a walk from its first frame on.
 
@@ -65,8 +65,8 @@ def compose(
         frames: (k,) a walk; two frames or more.
         place: (4,) where the clip of the first frame is put.
         fps: Frame rate of the motion, by default the graph's.
-        fit: How feet are fitted, by default as `FitConfig` says.
         ground: (n, 2) height of the ground under each foot [m], by default 0.
+        max_root_drop: How far the root is lowered at most for legs that are too short [m].
 
     Raises:
         MotionError: The motion would have more than `MOST_FRAMES` frames.
@@ -103,8 +103,8 @@ def compose(
     # The first frame of the motion after the frame left.
     entered = np.unique(np.searchsorted(step, jumps - 1))
     blend_s = graph.config.blend_s
-    composed = Composed(poses, source, contacts, entered, fps, blend_s, poses[:1], ground)
-    fitted = fit_feet(character, composed, fit)
+    composed = ComposedMotion(poses, source, contacts, entered, fps, blend_s, poses[:1], ground)
+    fitted = fit_feet(character, composed, max_root_drop)
     # Memory that the motion needs to be made.
     del composed, source, knots, moving
     return Composition(

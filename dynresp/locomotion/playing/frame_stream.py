@@ -10,7 +10,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
 from dynresp.locomotion.playing.composition import Way, between_knots, standing
 from dynresp.motion.character import Character
-from dynresp.motion.feet.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.feet.foot_fitting import ComposedMotion, fit_feet, look_ahead_frames
 from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
@@ -145,8 +145,8 @@ class Stream:
             to the end. Frames that later ones can hardly change are not changed any more.
         """
         self._forget(now - round(_KEPT_S * self._fps))
-        config, kept = FitConfig(), self._settled
-        composed = Composed(
+        kept = self._settled
+        composed = ComposedMotion(
             self._poses,
             self._source,
             self._contacts,
@@ -155,8 +155,8 @@ class Stream:
             self.graph.config.blend_s,
             self._laid[:kept],
         )
-        self._laid = fit_feet(self._character, composed, config)
-        settled = max(len(self._laid) - config.look_ahead(self._fps), now + 1 - self._first)
+        self._laid = fit_feet(self._character, composed)
+        settled = max(len(self._laid) - look_ahead_frames(self._fps), now + 1 - self._first)
         self._settled = min(max(kept, settled), len(self._laid))
         return self._first + kept, self._laid[kept:]
 

@@ -25,7 +25,6 @@ from dynresp.locomotion.worlds.world_contacts import PALM, palms
 from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.feet import legs
-from dynresp.motion.feet.foot_fitting import FitConfig
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support import smoothing
@@ -115,7 +114,6 @@ def compose_on_playground(
     frames: npt.ArrayLike,
     fps: float | None = None,
     playground: Playground | None = None,
-    fit: FitConfig | None = None,
     config: HandFitConfig | None = None,
 ) -> Composition:
     """Play a walk through a playground, with hands on its bars.
@@ -126,8 +124,7 @@ def compose_on_playground(
         frames: (k,) a walk; two frames or more.
         fps: Frame rate of the motion, by default the graph's.
         playground: The bars, by default what CMU's subject 1 climbed on.
-        fit: How feet are fitted.
-        config: How hands are.
+        config: How hands are fitted.
 
     Returns:
         As `compose`; `motion` is fitted.
@@ -137,7 +134,7 @@ def compose_on_playground(
     """
     config = config or HandFitConfig()
     playground = playground or recorded_playground()
-    played = compose(graph, character, frames, fps=fps, fit=fit)
+    played = compose(graph, character, frames, fps=fps)
     motion = played.motion
     held = find_holds(graph, character, played, playground, config)
     poses = _hold_on(character, motion, held, config)

@@ -22,7 +22,6 @@ from dynresp.locomotion.worlds.world_contacts import sole_corners
 from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.feet import legs
-from dynresp.motion.feet.foot_fitting import FitConfig
 from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
@@ -31,7 +30,9 @@ from dynresp.support.arrays import LongArray
 from dynresp.support.errors import UsageError
 from dynresp.support.runs import runs
 
-_FIT = FitConfig(farthest=0.4, deepest=0.12)
+# How far the root is lowered at most [m]: farther than on level ground, since so little was
+# recorded that jumps are rough.
+_MAX_ROOT_DROP = 0.12
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,6 @@ def compose_on_terrain(
     terrain: Terrain,
     walk: TerrainWalk,
     fps: float | None = None,
-    fit: FitConfig | None = None,
     config: TerrainFitConfig | None = None,
 ) -> Composition:
     """Play a walk over blocks, with its feet on them.
@@ -101,8 +101,6 @@ def compose_on_terrain(
         terrain: The blocks.
         walk: The walk; two frames or more.
         fps: Frame rate of the motion, by default the graph's.
-        fit: How feet are kept from sliding; by default feet are held farther from where they are
-            played than on level ground, since so little was recorded that jumps are rough.
         config: How they are put on the blocks.
 
     Returns:
@@ -111,7 +109,9 @@ def compose_on_terrain(
     """
     config = config or TerrainFitConfig()
     character, rate = graph.character, graph.graph.config.fps
-    played = compose(graph.graph, character, walk.frames, walk.placements[0], fps, fit or _FIT)
+    played = compose(
+        graph.graph, character, walk.frames, walk.placements[0], fps, max_root_drop=_MAX_ROOT_DROP
+    )
     motion = played.motion
     blocks = walk_blocks(walk, rate, motion)
     poses = _put_on_blocks(character, terrain, motion, blocks, config)

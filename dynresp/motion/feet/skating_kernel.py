@@ -17,27 +17,27 @@ _CORNERS = types.Array(types.float64, 3, "C", readonly=True)
 
 
 @njit
-def least_way(ways, touching):
-    """How far the sole's stillest point moves.
+def least_slide(shifts, touching):
+    """How the sole's stillest point moves over the ground.
 
-    A sole that is turned and shifted moves its points by a linear map of where they are, so the
-    ways of all points between corners fill the hull of the corners' ways; the shortest of them is
-    wanted.
+    When a sole turns and shifts, the shift of a point is a linear function of where the point is.
+    So the shifts of all points between corners fill the hull of the corners' shifts; this is the
+    shortest of them.
 
     Args:
-        ways: (4, 2) how far each corner moves over the ground.
+        shifts: (4, 2) how each corner moves over the ground [m].
         touching: (4,) which corners the foot stands on; at least one.
 
     Returns:
-        The way x, y of that point.
+        The shift x, y of that point [m].
     """
     best, x, y = np.inf, 0.0, 0.0
     for i in range(4):
         for j in range(i, 4):
             if not (touching[i] and touching[j]):
                 continue
-            ax, ay = ways[i, 0], ways[i, 1]
-            bx, by = ways[j, 0] - ax, ways[j, 1] - ay
+            ax, ay = shifts[i, 0], shifts[i, 1]
+            bx, by = shifts[j, 0] - ax, shifts[j, 1] - ay
             length = bx * bx + by * by
             part = 0.0
             if length > 0.0:
@@ -51,10 +51,10 @@ def least_way(ways, touching):
         for k in range(1, 4):
             i, j = (left_out + k) % 4, (left_out + k % 3 + 1) % 4
             corners += touching[i]
-            cross = ways[i, 0] * ways[j, 1] - ways[i, 1] * ways[j, 0]
+            cross = shifts[i, 0] * shifts[j, 1] - shifts[i, 1] * shifts[j, 0]
             positive += cross > 0.0
             negative += cross < 0.0
-        # None moves at all: the origin lies in the triangle of three ways.
+        # Some point does not move: the origin is in the triangle of three shifts.
         if corners == 3 and (positive == 3 or negative == 3):
             return 0.0, 0.0
     return x, y
@@ -66,22 +66,22 @@ def slides_kernel(corners, touch):
 
     Args:
         corners: (frames, 4, 3) where the corners of its sole are [m].
-        touch: How much higher than the lowest a corner that touches is at most [m].
+        touch: A corner touches that is at most this much above the lowest [m].
 
     Returns:
         (frames - 1,) [m].
     """
     slides = np.empty(len(corners) - 1)
-    ways = np.empty((4, 2))
+    shifts = np.empty((4, 2))
     touching = np.empty(4, np.bool_)
     for k in range(len(slides)):
         lowest = np.inf
         for c in range(4):
             lowest = min(lowest, corners[k, c, 2])
-            ways[c, 0] = corners[k + 1, c, 0] - corners[k, c, 0]
-            ways[c, 1] = corners[k + 1, c, 1] - corners[k, c, 1]
+            shifts[c, 0] = corners[k + 1, c, 0] - corners[k, c, 0]
+            shifts[c, 1] = corners[k + 1, c, 1] - corners[k, c, 1]
         for c in range(4):
             touching[c] = corners[k, c, 2] <= lowest + touch
-        x, y = least_way(ways, touching)
+        x, y = least_slide(shifts, touching)
         slides[k] = math.sqrt(x * x + y * y)
     return slides

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.character import Character
-from dynresp.motion.feet.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.feet.foot_fitting import ComposedMotion, fading_frames, fit_feet
 from dynresp.motion.feet.skating import foot_slides
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET
@@ -144,15 +144,14 @@ def _fitted(
         going_on: Whether that goes on after the last frame, so that nothing may be corrected there.
     """
     length = len(simulated) - 1
-    config = FitConfig()
     before, entered, blended = (_standing(character, x, fps) for x in (simulated, placed, poses))
     contacts = _stances(before, entered, blended, entered & ~_dragged(character, placed, fps))
     if going_on:
-        contacts[-config.fading(fps) :] = False
+        contacts[-fading_frames(fps) :] = False
     source = np.concatenate([simulated[:1], placed[1:]])
-    composed = Composed(poses, source, contacts, [1], fps, length / fps, fitted=poses[:1])
+    composed = ComposedMotion(poses, source, contacts, [1], fps, length / fps, fitted=poses[:1])
     # A leg that is bent may reach below the floor in one who falls.
-    return raise_above(character, fit_feet(character, composed, config), fps)
+    return raise_above(character, fit_feet(character, composed), fps)
 
 
 def _stances(before: Flags, entered: Flags, blended: Flags, still: Flags) -> Flags:

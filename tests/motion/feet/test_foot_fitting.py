@@ -11,14 +11,15 @@ from hypothesis import strategies as st
 
 from dynresp.motion import rotations
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.feet.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.feet import foot_fitting as foot_fitting_module
+from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP, STANCE_S, ComposedMotion, fit_feet
 from dynresp.motion.feet.foot_fitting_place_kernel import into_discs
 from dynresp.motion.feet.skating import TOUCH, foot_skates
 from dynresp.motion.ground import clearances, sole_points
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.errors import MotionError, UsageError
+from dynresp.support.errors import MotionError
 from tests.motion.foot_samples import (
     BLEND_S,
     FPS,
@@ -61,14 +62,17 @@ class TestStances:
         # A corner that by rounding does or does not touch.
         assert worst_slide(character, fitted, composed.contacts) < 3e-4
 
-    def test_equal_their_twin(self, character: Character, rng: np.random.Generator) -> None:
+    def test_equal_their_twin(
+        self, character: Character, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         """Without a jump: each stance by plain loops, each swing by textbook cubics."""
         motion = drifting(character, rng, 4.0)
         # Legs that are bent reach everywhere.
         motion = replace(motion, poses=crouched(character, motion.poses))
-        config = FitConfig(ease_s=10.0, fastest=100.0)
+        monkeypatch.setattr(foot_fitting_module, "EASE_S", 10.0)
+        monkeypatch.setattr(foot_fitting_module, "MAX_SHIFT_SPEED", 100.0)
         ankles, feet = foot_states(character, motion.poses)
-        got, _ = foot_states(character, fit_feet(character, unjumped(motion), config))
+        got, _ = foot_states(character, fit_feet(character, unjumped(motion)))
         for i, side in enumerate(FEET):
             sole = sole_points(character, side)
             turns = foot_fitting.as_rotation(feet[:, i])
@@ -77,7 +81,7 @@ class TestStances:
             shift = np.full((len(motion), 2), np.nan)
             for a, b in stances:
                 way = foot_fitting.unslid(ankles[a:b, i], turns[a:b], sole, TOUCH)
-                put = foot_fitting.put(way, ankles[a:b, i], round(config.stance_s * FPS))
+                put = foot_fitting.put(way, ankles[a:b, i], round(STANCE_S * FPS))
                 shift[a:b] = put - ankles[a:b, i, :2]
             for (_, a), (b, _) in pairwise(stances):
                 a, length = a - 1, b - a + 1
@@ -119,7 +123,7 @@ class TestStances:
         source = np.concatenate([bent[:jump], moved[jump:]])
         contacts = np.zeros((len(bent), 2), dtype=bool)
         contacts[:55, 0] = contacts[60:, 1] = True
-        composed = Composed(played, source, contacts, [jump], FPS, blend / FPS)
+        composed = ComposedMotion(played, source, contacts, [jump], FPS, blend / FPS)
         ankles, _ = foot_states(character, fit_feet(character, composed))
         before, after = (foot_states(character, x[:1])[0][0] for x in (bent, moved))
         np.testing.assert_allclose(ankles[:55, 0, :2], np.tile(before[0, :2], (55, 1)), atol=1e-6)
@@ -145,12 +149,14 @@ class TestStances:
         stands = composed.contacts[:, 0]
         assert away[stands].max() < 0.25
         lowered = composed.poses[:, 2] - fitted[:, 2]
-        assert lowered.max() < FitConfig().deepest
+        assert lowered.max() < MAX_ROOT_DROP
 
-    def test_a_foot_is_not_held_farther_away_than_allowed(self, character: Character) -> None:
+    def test_a_foot_is_not_held_farther_away_than_allowed(
+        self, character: Character, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         composed, _ = standing_over(character, 0.3)
-        config = FitConfig(farthest=0.1)
-        ankles, _ = foot_states(character, fit_feet(character, composed, config))
+        monkeypatch.setattr(foot_fitting_module, "MAX_HOLD_DISTANCE", 0.1)
+        ankles, _ = foot_states(character, fit_feet(character, composed))
         played, _ = foot_states(character, composed.poses)
         away = np.linalg.norm((ankles - played)[..., :2], axis=-1)
         assert away.max() == pytest.approx(0.1, abs=1e-3)
@@ -255,7 +261,7 @@ class TestTheRest:
             assert steps.max() < own.max() + 0.1
         lowered = composed.poses[:, 2] - fitted[:, 2]
         assert lowered.min() >= 0.0
-        assert lowered.max() <= FitConfig().deepest
+        assert lowered.max() <= MAX_ROOT_DROP
         assert np.abs(np.diff(lowered)).max() < 0.01
 
 
@@ -263,7 +269,7 @@ class TestRequests:
     """What is refused."""
 
     @pytest.mark.parametrize(
-        ("changed", "told"),
+        ("changed", "message"),
         [
             ({"source": np.zeros((4, 59))}, "source must have"),
             ({"contacts": np.zeros((5, 2), dtype=bool)}, "contacts must be"),
@@ -276,16 +282,12 @@ class TestRequests:
         ],
     )
     def test_what_does_not_fit(
-        self, character: Character, changed: dict[str, object], told: str
+        self, character: Character, changed: dict[str, object], message: str
     ) -> None:
         composed = unjumped(walk(character, 1.0))
-        with pytest.raises(MotionError, match=told):
-            replace(composed, **changed)  # type: ignore[arg-type]
-
-    @pytest.mark.parametrize("changed", [{"ease_s": 0.0}, {"root_s": np.nan}, {"straight": 1.2}])
-    def test_settings_out_of_bounds(self, changed: dict[str, float]) -> None:
-        with pytest.raises(UsageError, match=next(iter(changed))):
-            FitConfig(**changed)
+        wrong = replace(composed, **changed)  # type: ignore[arg-type]
+        with pytest.raises(MotionError, match=message):
+            fit_feet(character, wrong)
 
     def test_blends_before_the_first_frame_count(
         self, character: Character, rng: np.random.Generator
@@ -320,7 +322,7 @@ class TestRealWalks:
     ) -> None:
         file = motions_folder / "snumrl_DataDrivenBipedController" / f"{name}.bvh"
         motion = load_motion(file, options=LoadOptions(trim_t_poses=True)).resampled(fps)
-        composed = Composed(motion.poses, motion.poses, motion.contacts, [], fps, BLEND_S)
+        composed = ComposedMotion(motion.poses, motion.poses, motion.contacts, [], fps, BLEND_S)
         fitted = replace(motion, poses=fit_feet(character, composed))
         before, after = foot_skates(motion, character), foot_skates(fitted, character)
         assert np.median(before) > 0.01

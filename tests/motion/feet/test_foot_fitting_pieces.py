@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dynresp.motion import rotations
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.feet import legs
-from dynresp.motion.feet.foot_fitting import Composed, FitConfig, fit_feet
+from dynresp.motion.feet.foot_fitting import ComposedMotion, fit_feet, look_ahead_frames
 from dynresp.motion.motion import FEET, Motion
 from tests.motion.foot_samples import (
     BLEND_S,
@@ -43,7 +43,7 @@ class TestPieces:
     ) -> None:
         motion = drifting(character, rng, 10.0)
         whole = fit_feet(character, unjumped(motion))
-        ahead, step = FitConfig().look_ahead(FPS), 17
+        ahead, step = look_ahead_frames(FPS), 17
         shown = whole[:0]
         for start in range(0, len(motion) - ahead - step, step):
             stop = start + step + ahead
@@ -74,7 +74,7 @@ class TestPieces:
         poses = crouched(character, standing(character, 2.0, FPS).poses)
         poses[:, 0] += 0.3 / FPS * np.arange(len(poses))
         contacts = np.ones((len(poses), 2), dtype=bool)
-        composed = Composed(poses, poses, contacts, [], FPS, BLEND_S, fitted=poses[:10])
+        composed = ComposedMotion(poses, poses, contacts, [], FPS, BLEND_S, fitted=poses[:10])
         ankles, _ = foot_states(character, fit_feet(character, composed))
         ways = np.linalg.norm(np.diff(ankles[:, 0, :2], axis=0), axis=-1)
         np.testing.assert_allclose(ways[:9], 0.01, atol=1e-9)

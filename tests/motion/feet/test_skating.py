@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character, default_character
 from dynresp.motion.feet.skating import TOUCH, foot_skates, foot_slides
-from dynresp.motion.feet.skating_kernel import least_way, slides_kernel
+from dynresp.motion.feet.skating_kernel import least_slide, slides_kernel
 from dynresp.motion.ground import sole_points
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
@@ -119,13 +119,13 @@ class TestTwins:
         ways = rng.normal(size=(4, 2)) + rng.normal(size=2)
         touching = np.zeros(4, dtype=bool)
         touching[rng.permutation(4)[:corners]] = True
-        found = np.array(least_way(ways, touching))
+        found = np.array(least_slide(ways, touching))
         twin = foot_fitting.stillest_way(ways[touching])
         np.testing.assert_allclose(np.linalg.norm(found), np.linalg.norm(twin), atol=1e-6)
 
     def test_equal_ways_have_that_way(self) -> None:
         ways = np.tile([0.3, -0.4], (4, 1))
-        assert least_way(ways, np.ones(4, dtype=bool)) == pytest.approx((0.3, -0.4))
+        assert least_slide(ways, np.ones(4, dtype=bool)) == pytest.approx((0.3, -0.4))
 
     @given(seed=seeds)
     def test_feet_anyhow(self, seed: int) -> None:
