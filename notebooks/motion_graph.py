@@ -36,8 +36,7 @@ from dynresp.avatar_runs.sketch_run import sketch_outing
 from dynresp.avatar_runs.world_setup import standing_about
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.clusters.cluster_observations import observations
-from dynresp.locomotion.clusters.frame_clusters import ClusterConfig, Clusters
-from dynresp.locomotion.clusters.gaussian_mixture import MixtureConfig
+from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import compose
 from dynresp.locomotion.playing.gait_measures import gait_of
@@ -156,8 +155,7 @@ transitions.print_between_sessions(walking)
 
 # %%
 unbounded = {
-    name: Clusters.of(graph, ClusterConfig(MixtureConfig(most=100)), character=character)
-    for name, graph in ours.items()
+    name: Clusters.of(graph, max_clusters=100, character=character) for name, graph in ours.items()
 }
 usual = {name: Clusters.of(graph, character=character) for name, graph in ours.items()}
 study.table(

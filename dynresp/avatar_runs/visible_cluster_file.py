@@ -24,7 +24,11 @@ from dynresp.locomotion.vision.action_recognition import Recogniser
 from dynresp.locomotion.vision.silhouette_features import FeatureConfig
 from dynresp.locomotion.vision.silhouette_table import ViewTable, table_identity
 from dynresp.locomotion.vision.silhouettes import Viewpoints
-from dynresp.locomotion.vision.visible_clusters import OBSERVED, cluster_by_sight
+from dynresp.locomotion.vision.visible_clusters import (
+    CLUSTERING_VERSION,
+    OBSERVATION_SIZE,
+    find_visible_clusters,
+)
 from dynresp.motion.character import Character
 from dynresp.support.archive import TEXT, ArchiveFormat, Arrays, text_array
 from dynresp.support.errors import DynrespError, GraphFileError
@@ -129,7 +133,7 @@ class Sight:
 
         def learn() -> tuple[Clusters, Recogniser]:
             progress("telling actions apart", 0, 2)
-            clusters = cluster_by_sight(graph, most, character)
+            clusters = find_visible_clusters(graph, most, character)
             progress("telling actions apart", 1, 2)
             return clusters, Recogniser.trained(database, table, clusters.labels)
 
@@ -188,7 +192,7 @@ def load_actions(
     frames, count, width = len(graph.database), len(a["weights"]), len(a["first_biases"])
     seen = len(a["ages"]) * table.rows.shape[2]
     shapes = {
-        "means": (count, OBSERVED),
+        "means": (count, OBSERVATION_SIZE),
         "variances": (count,),
         "labels": (frames,),
         "log_probabilities": (frames, count),
@@ -246,7 +250,7 @@ def _within(numbers: np.ndarray, end: int) -> bool:
 
 def _identity(graph: MotionGraph, table: ViewTable, most: int) -> str:
     """Short hash of all that clusters, and what tells them, follow from."""
-    told = f"{graph_identity(graph)} {table.identity} {most}"
+    told = f"{graph_identity(graph)} {table.identity} {most} {CLUSTERING_VERSION}"
     return hashlib.sha256(told.encode()).hexdigest()[:16]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dynresp.bench.graph_figures import WORLDS, Measurement, Value
 from dynresp.locomotion.clusters.cluster_observations import observations
-from dynresp.locomotion.clusters.frame_clusters import ClusterConfig, Clusters
+from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.clusters.gaussian_mixture import fit_from_means
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
@@ -25,9 +25,8 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
     """
     from threadpoolctl import threadpool_limits
 
-    config = ClusterConfig()
     start = time.perf_counter()
-    clusters = Clusters.of(graph, config, character=character)
+    clusters = Clusters.of(graph, character=character)
     seconds = time.perf_counter() - start
     x = observations(graph.database, graph.config.coordinates, character)
     x = x[graph.frames[clusters.spacing // 2 :: clusters.spacing]]
@@ -35,7 +34,7 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
     start = time.perf_counter()
     with threadpool_limits(limits=1):
         tried = [
-            fit_from_means(x, x[rng.choice(len(x), len(clusters), replace=False)], config.mixture)
+            fit_from_means(x, x[rng.choice(len(x), len(clusters), replace=False)])
             for _ in range(count)
         ]
     trying_s = time.perf_counter() - start

@@ -26,7 +26,11 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.vision.action_recognition import Recogniser
 from dynresp.locomotion.vision.video_control import VideoControl
 from dynresp.locomotion.vision.video_following import CHOICE_S, follow_sightings
-from dynresp.locomotion.vision.visible_clusters import MOST, cluster_by_sight, sight_observations
+from dynresp.locomotion.vision.visible_clusters import (
+    MAX_VISIBLE_CLUSTERS,
+    find_visible_clusters,
+    visible_observations,
+)
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.support.arrays import IntArray
@@ -62,7 +66,7 @@ def run(
     seed: int = 0,
     motions: Path | None = None,
     *,
-    clusters: Sequence[int] = (MOST,),
+    clusters: Sequence[int] = (MAX_VISIBLE_CLUSTERS,),
     most_s: float = MOST_S,
     progress: Callable[[str], None] = lambda _: None,
 ) -> BenchResult:
@@ -206,7 +210,7 @@ def leave_out(
     """
     database, table, translated = gathered.without(studio)
     graph = MotionGraph.of(database, GRAPH, character)
-    clusters = cluster_by_sight(graph, most, character)
+    clusters = find_visible_clusters(graph, most, character)
     commonest = int(np.bincount(clusters.labels[graph.frames]).argmax())
     forest = ClusterForest(graph, clusters)
     recogniser = Recogniser.trained(database, table, clusters.labels, seed)
@@ -219,7 +223,7 @@ def leave_out(
         parts, choosing_s = [], 0.0
         for take in own:
             acted = MotionDatabase.gather([take.truth], character, table.fps)
-            truth = clusters.mixture.labels(sight_observations(acted, character))
+            truth = clusters.mixture.labels(visible_observations(acted, character))
             control = VideoControl(forest, table, recogniser)
             seen, start = translated(take), int(rng.choice(graph.frames))
             began = time.perf_counter()

@@ -188,12 +188,12 @@ def video(
     """How well an avatar follows strangers in videos, one studio left out at a time."""
     typer.echo("filming and watching people for about twelve minutes ...", err=True)
     from dynresp.bench import video as bench
-    from dynresp.locomotion.vision.visible_clusters import MOST
+    from dynresp.locomotion.vision.visible_clusters import MAX_VISIBLE_CLUSTERS
 
     def progress(doing: str) -> None:
         typer.echo(doing, err=True)
 
-    counts = clusters or [MOST]
+    counts = clusters or [MAX_VISIBLE_CLUSTERS]
     _print(bench.run(seed or 0, motions, clusters=counts, progress=progress), as_json)
 
 

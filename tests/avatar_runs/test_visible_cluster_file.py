@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynresp.avatar_runs import visible_cluster_file
 from dynresp.avatar_runs.visible_cluster_file import FORMAT, Sight, load_actions, save_actions
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
@@ -54,6 +55,15 @@ def test_another_bound_is_another_file(
     Sight.of(graph, character, 3, lambda stage, *_: stages.append(stage), pytest.fail)
     assert set(stages) == {"telling actions apart"}
     assert len(list((cache / "sight").glob("actions-*.npz"))) == 2
+
+
+def test_another_version_of_the_clustering_is_another_file(
+    sight: Sight, graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(visible_cluster_file, "CLUSTERING_VERSION", 0)
+    stages = []
+    Sight.of(graph, character, 2, lambda stage, *_: stages.append(stage), pytest.fail)
+    assert set(stages) == {"telling actions apart"}
 
 
 @pytest.mark.parametrize(

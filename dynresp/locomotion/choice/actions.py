@@ -196,7 +196,10 @@ class _Candidates:
             return []
         from dynresp.locomotion.choice.dispersal_kernel import farthest_kernel
 
-        clusters, apart = self.tree.node_clusters[self.nodes], self.forest.clusters.apart
+        clusters, apart = (
+            self.tree.node_clusters[self.nodes],
+            self.forest.clusters.squared_distances,
+        )
         probability = self.tree.log_probabilities[self.tree.node_visits[self.nodes]]
         best = int(np.argmax(probability))
         nearest = np.full(len(self.nodes), np.inf)

@@ -1,14 +1,14 @@
-"""Mixtures of isotropic Gaussians: fitted by EM, sized by BIC, with seeds found by growing.
+"""Fit a mixture of isotropic Gaussians by EM, and choose its size by BIC.
 
-Lee et al. 2002, section 4.2.1, after Fraley & Raftery 1998. The paper's seeds were picked by hand.
-Here a mixture grows instead: it begins with one cluster, and the cluster whose halves explain its
-observations best is split, EM runs, and so on. One sweep gives the whole curve of BIC over the
-number of clusters. The best mixture is then tried with two of its clusters merged and a third one
-split (after Ueda et al. 2000, "SMEM algorithm for mixture models") while that makes it likelier.
-Nothing is random, and all runs on one thread: the same observations give the same bits.
+Source: Lee et al. 2002, section 4.2.1, after Fraley & Raftery 1998. The paper picked the seeds by
+hand. Here the mixture grows: it starts with one cluster; then the cluster whose split gains most
+likelihood is split, EM runs, and so on. One sweep gives BIC for every number of clusters. In the
+best mixture, two clusters are merged and a third one is split (after Ueda et al. 2000, "SMEM
+algorithm for mixture models") for as long as that raises the likelihood. Nothing is random and
+everything runs on one thread: the same observations give the same bits.
 
-BIC (eq. 6) is 2 L - m log N, larger is better. Where the paper counts clusters x dimension for m,
-all that is estimated counts here: K means of d numbers, K variances, and K - 1 free weights.
+BIC (eq. 6) is 2 L - m log N; larger is better. The paper takes clusters x dimension for m. Here m
+counts every estimated number: K means of d numbers, K variances, and K - 1 free weights.
 """
 
 from __future__ import annotations
@@ -25,47 +25,26 @@ from dynresp.support.arrays import IntArray
 from dynresp.support.errors import MotionError, UsageError
 from dynresp.support.extras import require
 
-# When EM stops: at which gain in log-likelihood for one observation, or after how many steps.
-# While growing that may be early; the mixture that is kept runs to the end.
+MAX_CLUSTERS = 32
+"""Default limit on the number of clusters: a user can still tell so many from each other."""
+MIN_DEVIATION = 0.01
+"""Its square is added to every variance, in the unit of the observations, so that no cluster
+shrinks onto a single observation or onto equal ones."""
+# Fewest observations in each half of a split.
+_MIN_OBSERVATIONS = 4
+# EM tries so many of the most promising splits, and of merges.
+_TRIED_SPLITS = 2
+# Growing stops when BIC has not risen for so many sizes.
+_PATIENCE = 5
+# EM stops at this gain in log-likelihood for one observation, or after so many steps. Growing may
+# stop early; the mixture that is kept runs to the end.
 _GROWING = (1e-3, 30)
 _FINAL = (1e-4, 300)
 
 
-@dataclass(frozen=True)
-class MixtureConfig:
-    """How a mixture is fitted.
-
-    Attributes:
-        most: Most clusters.
-        least_observations: Fewest observations that a half of a split may have.
-        least_deviation: Added (squared) to every variance, in the unit of the observations, so
-            that no cluster shrinks onto a single observation or onto equal ones.
-        splits: How many of the most promising splits, and of merges, are tried by EM.
-        patience: Growing stops when BIC has not risen for as many sizes.
-    """
-
-    most: int = 32
-    least_observations: int = 4
-    least_deviation: float = 0.01
-    splits: int = 2
-    patience: int = 5
-
-    def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            UsageError: One of them makes no sense.
-        """
-        for name in ("most", "least_observations", "splits", "patience"):
-            if getattr(self, name) < 1:
-                raise UsageError(f"{name} must be 1 or more, got {getattr(self, name)}")
-        if not 0.0 < self.least_deviation < np.inf:
-            raise UsageError(f"least_deviation must be above 0, got {self.least_deviation}")
-
-
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """K isotropic Gaussians in d dimensions. Arrays are read-only.
+    """K isotropic Gaussians in d dimensions. The arrays are read-only.
 
     Attributes:
         weights: (K,) prior probabilities.
@@ -97,8 +76,8 @@ class Mixture:
         dimension = self.means.shape[1]
         out = np.empty((len(observations), len(self)))
         for k, (mean, variance) in enumerate(zip(self.means, self.variances, strict=True)):
-            apart = observations - mean
-            out[:, k] = np.einsum("nd,nd->n", apart, apart) / variance
+            offset = observations - mean
+            out[:, k] = np.einsum("nd,nd->n", offset, offset) / variance
         constant = np.log(self.weights) - 0.5 * dimension * np.log(2.0 * np.pi * self.variances)
         return constant - 0.5 * out
 
@@ -123,7 +102,7 @@ class Mixture:
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """What a mixture of one size reached while growing.
+    """How well a mixture of one size fits, while growing.
 
     Attributes:
         clusters: How many.
@@ -142,8 +121,8 @@ class MixtureFit:
 
     Attributes:
         mixture: The one of the best BIC, refined.
-        curve: All sizes that were tried, ascending.
-        bounded: Whether BIC was still the best at the most clusters that were allowed.
+        curve: All sizes that were tried, ascending; one point where seeds were given.
+        bounded: Whether the largest allowed number of clusters had the best BIC.
     """
 
     mixture: Mixture
@@ -153,60 +132,60 @@ class MixtureFit:
 
 def fit_mixture(
     observations: npt.ArrayLike,
-    config: MixtureConfig | None = None,
+    max_clusters: int = MAX_CLUSTERS,
     seeds: Sequence[int] | None = None,
 ) -> MixtureFit:
     """Fit a mixture to observations.
 
     Args:
         observations: (n, d), finite, all coordinates in comparable units.
-        config: Settings.
-        seeds: Rows of the observations to begin with as means, one for each cluster, as the
-            paper's authors picked them; found by growing where none are given.
+        max_clusters: Most clusters, at least 1; seeds override it.
+        seeds: Rows of the observations that are the first means, one for each cluster, as the
+            paper's authors picked them. Without seeds the mixture grows.
 
     Raises:
-        MotionError: Observations that are no finite (n, d) array, or fewer than two.
-        UsageError: Seeds that are not rows of the observations, or not different.
+        MotionError: The observations are not a finite (n, d) array of at least two rows.
+        UsageError: max_clusters is below 1, or the seeds are not different rows.
     """
     from threadpoolctl import threadpool_limits
 
-    config = config or MixtureConfig()
+    if max_clusters < 1:
+        raise UsageError(f"max_clusters must be 1 or more, got {max_clusters}")
     x = np.ascontiguousarray(observations, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or x.size == 0 or not np.isfinite(x).all():
         raise MotionError(
             f"observations must be a finite (n, d) array of at least two, got shape {x.shape}"
         )
-    # Sums of BLAS depend on its threads in their last bits.
+    # The last bits of sums in BLAS depend on the number of threads.
     with threadpool_limits(limits=1):
         if seeds is not None:
-            mixture = fit_from_means(x, x[_checked_seeds(seeds, len(x))], config)
+            mixture = fit_from_means(x, x[_checked_seeds(seeds, len(x))])
             return MixtureFit(mixture, (_point(mixture, x),), False)
-        grown = list(_grow(x, config))
+        grown = list(_grow(x, max_clusters))
         points = [_point(mixture, x) for mixture in grown]
         best = int(np.argmax([p.bic for p in points]))
-        mixture = _refined(x, grown[best], config)
+        mixture = _refined(x, grown[best])
         points[best] = _point(mixture, x)
-    return MixtureFit(mixture, tuple(points), best + 1 == config.most > 1)
+    return MixtureFit(mixture, tuple(points), best + 1 == max_clusters > 1)
 
 
-def fit_from_means(x: FloatArray, means: FloatArray, config: MixtureConfig) -> Mixture:
-    """EM from given means, equal weights, and the variance of everything around its nearest mean.
+def fit_from_means(x: FloatArray, means: FloatArray) -> Mixture:
+    """Run EM from given means, equal weights, and the variance around the nearest mean.
 
     Args:
         x: (n, d) observations.
         means: (K, d).
-        config: Settings; the number of clusters is that of the means.
     """
     nearest = np.full(len(x), np.inf)
     for mean in means:
         nearest = np.minimum(nearest, np.sum((x - mean) ** 2, axis=1))
-    variance = float(nearest.mean()) / x.shape[1] + config.least_deviation**2
+    variance = float(nearest.mean()) / x.shape[1] + MIN_DEVIATION**2
     size = len(means)
     start = Mixture(np.full(size, 1.0 / size), np.array(means), np.full(size, variance))
-    return _em(x, start, config, _FINAL)
+    return _em(x, start, _FINAL)
 
 
-def _em(x: FloatArray, start: Mixture, config: MixtureConfig, stop: tuple[float, int]) -> Mixture:
+def _em(x: FloatArray, start: Mixture, stop: tuple[float, int]) -> Mixture:
     require("sklearn")
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.mixture import GaussianMixture
@@ -216,11 +195,11 @@ def _em(x: FloatArray, start: Mixture, config: MixtureConfig, stop: tuple[float,
         covariance_type="spherical",
         tol=stop[0],
         max_iter=stop[1],
-        reg_covar=config.least_deviation**2,
+        reg_covar=MIN_DEVIATION**2,
         weights_init=start.weights,
         means_init=start.means,
         precisions_init=1.0 / start.variances,
-        # Everything is given; the other ways to begin would cost time first.
+        # The start is given in full; other values would spend time on one of their own.
         init_params="random_from_data",
         random_state=0,
     )
@@ -232,52 +211,52 @@ def _em(x: FloatArray, start: Mixture, config: MixtureConfig, stop: tuple[float,
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Observations that are taken to be one Gaussian's."""
+    """Observations of one Gaussian: how many, their mean and variance."""
 
     count: int
     mean: FloatArray
     variance: float
 
     @classmethod
-    def of(cls, x: FloatArray, config: MixtureConfig) -> _Group:
+    def of(cls, x: FloatArray) -> _Group:
         mean = x.mean(axis=0)
-        return cls(len(x), mean, float(np.mean((x - mean) ** 2)) + config.least_deviation**2)
+        return cls(len(x), mean, float(np.mean((x - mean) ** 2)) + MIN_DEVIATION**2)
 
     @property
     def score(self) -> float:
-        """Log-likelihood but for what a split or merge leaves as it is."""
+        """Log-likelihood without the terms that a split or merge does not change."""
         entropy = 0.5 * len(self.mean) * np.log(self.variance)
         return self.count * (float(np.log(self.count)) - float(entropy))
 
 
-def _grow(x: FloatArray, config: MixtureConfig) -> Iterator[Mixture]:
-    """Mixtures of 1, 2, ... clusters, each from the one before by the best of some splits."""
-    whole = _Group.of(x, config)
+def _grow(x: FloatArray, max_clusters: int) -> Iterator[Mixture]:
+    """Mixtures of 1, 2, ... clusters; each splits one cluster of the mixture before it."""
+    whole = _Group.of(x)
     mixture = Mixture(np.ones(1), whole.mean[None], np.array([whole.variance]))
     best, since = -np.inf, 0
     while True:
         yield mixture
         bic = mixture.bic(x)
         best, since = (bic, 0) if bic > best else (best, since + 1)
-        if len(mixture) >= config.most or since >= config.patience:
+        if len(mixture) >= max_clusters or since >= _PATIENCE:
             return
         groups = _groups(x, mixture)
-        halves = _ranked_splits(groups, config)[: config.splits]
-        tried = [_em(x, _replaced(mixture, (k,), (a, b)), config, _GROWING) for k, (a, b) in halves]
+        halves = _ranked_splits(groups)[:_TRIED_SPLITS]
+        tried = [_em(x, _replaced(mixture, (k,), (a, b)), _GROWING) for k, (a, b) in halves]
         if not tried:
             return
         mixture = max(tried, key=lambda m: m.log_likelihood(x))
 
 
-def _refined(x: FloatArray, mixture: Mixture, config: MixtureConfig) -> Mixture:
-    """Merge two clusters and split a third, as often as that makes all likelier."""
-    mixture = _em(x, mixture, config, _FINAL)
+def _refined(x: FloatArray, mixture: Mixture) -> Mixture:
+    """Merge two clusters and split a third, while that raises the likelihood."""
+    mixture = _em(x, mixture, _FINAL)
     likelihood = mixture.log_likelihood(x)
-    # Each round gains at least what EM takes for nothing, and there are few of them.
+    # Each round must gain more than the tolerance of EM; the number of rounds is limited.
     for _ in range(len(mixture)):
-        moves = list(_moves(x, mixture, config))
+        moves = list(_moves(x, mixture))
         for start in moves:
-            moved = _em(x, start, config, _FINAL)
+            moved = _em(x, start, _FINAL)
             gain = moved.log_likelihood(x) - likelihood
             if gain > _FINAL[0] * len(x):
                 mixture, likelihood = moved, likelihood + gain
@@ -287,10 +266,10 @@ def _refined(x: FloatArray, mixture: Mixture, config: MixtureConfig) -> Mixture:
     return mixture
 
 
-def _moves(x: FloatArray, mixture: Mixture, config: MixtureConfig) -> Iterator[Mixture]:
-    """Starts of EM with two clusters merged and another split, the most promising first."""
+def _moves(x: FloatArray, mixture: Mixture) -> Iterator[Mixture]:
+    """Starts for EM: two clusters merged and another one split, the most promising first."""
     members = _groups(x, mixture)
-    groups = [_Group.of(g, config) if len(g) else None for g in members]
+    groups = [_Group.of(g) if len(g) else None for g in members]
     merges: list[tuple[float, int, int, _Group]] = []
     for i, a in enumerate(groups):
         for j, b in enumerate(groups[:i]):
@@ -298,10 +277,10 @@ def _moves(x: FloatArray, mixture: Mixture, config: MixtureConfig) -> Iterator[M
                 merged = _merged(a, b)
                 merges.append((merged.score - a.score - b.score, i, j, merged))
     merges.sort(key=lambda m: -m[0])
-    splits = _ranked_splits(members, config)
-    for _, i, j, merged in merges[: config.splits]:
+    splits = _ranked_splits(members)
+    for _, i, j, merged in merges[:_TRIED_SPLITS]:
         others = [(k, halves) for k, halves in splits if k not in (i, j)]
-        for k, (a, b) in others[: config.splits]:
+        for k, (a, b) in others[:_TRIED_SPLITS]:
             yield _replaced(mixture, (i, j, k), (merged, a, b))
 
 
@@ -311,25 +290,25 @@ def _groups(x: FloatArray, mixture: Mixture) -> list[FloatArray]:
 
 
 def _ranked_splits(
-    groups: Sequence[FloatArray], config: MixtureConfig
+    groups: Sequence[FloatArray],
 ) -> list[tuple[int, tuple[_Group, _Group]]]:
-    """Clusters that can be split, with their halves, the greatest gain in likelihood first."""
+    """Clusters that can be split, with their halves, by falling gain in likelihood."""
     found: list[tuple[float, int, tuple[_Group, _Group]]] = []
     for k, group in enumerate(groups):
-        side = _halves(group) if len(group) >= 2 * config.least_observations else None
-        if side is None or min(side.sum(), (~side).sum()) < config.least_observations:
+        side = _halves(group) if len(group) >= 2 * _MIN_OBSERVATIONS else None
+        if side is None or min(side.sum(), (~side).sum()) < _MIN_OBSERVATIONS:
             continue
-        a, b = _Group.of(group[side], config), _Group.of(group[~side], config)
-        found.append((a.score + b.score - _Group.of(group, config).score, k, (a, b)))
+        a, b = _Group.of(group[side]), _Group.of(group[~side])
+        found.append((a.score + b.score - _Group.of(group).score, k, (a, b)))
     found.sort(key=lambda split: -split[0])
     return [(k, halves) for _, k, halves in found]
 
 
 def _halves(x: FloatArray) -> npt.NDArray[np.bool_] | None:
-    """(n,) on which side each lies: two means that begin along the longest axis of the cloud."""
-    apart = x - x.mean(axis=0)
+    """(n,) which half each belongs to: 2-means, started along the longest axis of the cloud."""
+    centered = x - x.mean(axis=0)
     # Eigenvectors of a d x d matrix are cheaper than singular vectors of all observations.
-    side = apart @ np.linalg.eigh(apart.T @ apart)[1][:, -1] > 0.0
+    side = centered @ np.linalg.eigh(centered.T @ centered)[1][:, -1] > 0.0
     for _ in range(10):
         if side.all() or not side.any():
             return None
@@ -349,14 +328,15 @@ def _merged(a: _Group, b: _Group) -> _Group:
     return _Group(count, share * a.mean + (1.0 - share) * b.mean, variance)
 
 
-def _replaced(mixture: Mixture, gone: tuple[int, ...], groups: tuple[_Group, ...]) -> Mixture:
-    """The mixture without some clusters, whose weight groups of observations take over."""
+def _replaced(mixture: Mixture, removed: tuple[int, ...], groups: tuple[_Group, ...]) -> Mixture:
+    """The mixture after groups of observations replace some clusters and take over their weight."""
     counts = np.array([group.count for group in groups], dtype=np.float64)
     weights = np.append(
-        np.delete(mixture.weights, gone), mixture.weights[list(gone)].sum() * counts / counts.sum()
+        np.delete(mixture.weights, removed),
+        mixture.weights[list(removed)].sum() * counts / counts.sum(),
     )
-    means = np.vstack([np.delete(mixture.means, gone, axis=0), *(g.mean[None] for g in groups)])
-    variances = np.append(np.delete(mixture.variances, gone), [g.variance for g in groups])
+    means = np.vstack([np.delete(mixture.means, removed, axis=0), *(g.mean[None] for g in groups)])
+    variances = np.append(np.delete(mixture.variances, removed), [g.variance for g in groups])
     return Mixture(weights / weights.sum(), means, variances)
 
 

@@ -1,10 +1,10 @@
-"""Clusters of what can be seen: where limbs are and how somebody moves.
+"""Cluster frames by what a camera can see: where the limbs are and how the person moves.
 
-The clusters of choice and sketch are made of joint angles (eq. 4 of Lee et al. 2002). A silhouette
-does not show how far an upper arm is turned about its own axis, and just there skeletons from
-different sources differ when they are laid onto one character. For control by video clusters are
-therefore made of places: head, hands, elbows, shoulders, knees and feet against the pelvis in the
-facing frame, its height, and the speeds ahead, to the left and of turning, all averaged over a
+Control by choice and by sketch cluster joint angles (eq. 4 of Lee et al. 2002). A silhouette does
+not show the twist of an upper arm about its own axis, and skeletons from different sources differ
+most in that twist once they are mapped onto one character. So control by video clusters positions:
+head, hands, elbows, shoulders, knees and feet relative to the pelvis in the facing frame, the
+height of the pelvis, and the speeds ahead, to the left and of turning. All are averaged over a
 walk's cycle, so that a cluster is an action and not a phase of one.
 """
 
@@ -13,33 +13,35 @@ from __future__ import annotations
 import numpy as np
 
 from dynresp.locomotion.clusters.cluster_observations import WALK_CYCLE_S, averaged
-from dynresp.locomotion.clusters.frame_clusters import Clusters
-from dynresp.locomotion.clusters.gaussian_mixture import MixtureConfig, fit_mixture
+from dynresp.locomotion.clusters.frame_clusters import Clusters, fit_clusters
 from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character, default_character
 from dynresp.motion.rotations import FloatArray
 
-MOST = 5
-"""Actions told apart by default: finer ones look too much alike from some sides."""
+MAX_VISIBLE_CLUSTERS = 5
+"""Default limit on the number of clusters: more of them look too much alike from some sides."""
+CLUSTERING_VERSION = 2
+"""Raised when the same frames give other clusters; it belongs to the identity of kept clusters.
+Version 2 drops empty clusters."""
 
-_PLACES = (
+_BODIES = (
     "head", "left_forearm", "right_forearm", "left_foot", "right_foot", "left_shank",
     "right_shank", "left_upper_arm", "right_upper_arm", "chest",
 )  # fmt: skip
 _HANDS = ("left_forearm", "right_forearm")
 # The hand in the frame of the forearm [m].
 _HAND = np.array([0.0, 0.0, -0.3])
-# What a metre of a limb, a metre of height, a metre a second and a radian a second count.
+# Weights of a metre of a limb, a metre of height, a metre a second and a radian a second.
 _LIMB, _HEIGHT, _SPEED, _TURN = 0.5, 3.0, 0.7, 0.2
-OBSERVED = 3 * (len(_PLACES) + len(_HANDS)) + 4
-"""Numbers of an observation: places, height and three speeds."""
-# Speeds are means over so long [s].
+OBSERVATION_SIZE = 3 * (len(_BODIES) + len(_HANDS)) + 4
+"""How many numbers an observation has: positions, height and three speeds."""
+# Speeds are means over this time [s].
 _SPEED_S = 0.4
 
 
-def sight_observations(database: MotionDatabase, character: Character) -> FloatArray:
+def visible_observations(database: MotionDatabase, character: Character) -> FloatArray:
     """One observation a frame.
 
     Args:
@@ -47,15 +49,15 @@ def sight_observations(database: MotionDatabase, character: Character) -> FloatA
         character: Whose they are.
 
     Returns:
-        (n, `OBSERVED`).
+        (n, `OBSERVATION_SIZE`).
     """
     poses = database.poses.copy()
     facing = database.planar[:, 3]
     poses[:, ROOT] = 0.0
     poses[:, ROOT_QUAT] = rotations.multiply(rotations.from_yaw(-facing), poses[:, ROOT_QUAT])
     states = character.kinematics(poses)
-    places = [states.positions[:, character.body(name)] for name in _PLACES]
-    places += [
+    positions = [states.positions[:, character.body(name)] for name in _BODIES]
+    positions += [
         states.positions[:, body] + rotations.rotate(states.quaternions[:, body], _HAND)
         for body in map(character.body, _HANDS)
     ]
@@ -66,40 +68,30 @@ def sight_observations(database: MotionDatabase, character: Character) -> FloatA
         part = slice(clip.start, clip.stop)
         frames = np.arange(clip.stop - clip.start)
         low, high = np.maximum(frames - half, 0), np.minimum(frames + half, len(frames) - 1)
-        passed = np.maximum(high - low, 1)[:, None] / database.fps
-        way = database.planar[part].copy()
-        way[:, 3] = np.unwrap(way[:, 3])
-        speed = (way[high] - way[low]) / passed
+        duration = np.maximum(high - low, 1)[:, None] / database.fps
+        root = database.planar[part].copy()
+        root[:, 3] = np.unwrap(root[:, 3])
+        speed = (root[high] - root[low]) / duration
         cosine, sine = np.cos(facing[part]), np.sin(facing[part])
         moving[part, 1] = _SPEED * (cosine * speed[:, 0] + sine * speed[:, 1])
         moving[part, 2] = _SPEED * (cosine * speed[:, 1] - sine * speed[:, 0])
         moving[part, 3] = _TURN * speed[:, 3]
-    return averaged(database, np.concatenate([_LIMB * np.hstack(places), moving], axis=1))
+    return averaged(database, np.concatenate([_LIMB * np.hstack(positions), moving], axis=1))
 
 
-def cluster_by_sight(
-    graph: MotionGraph, most: int = MOST, character: Character | None = None
+def find_visible_clusters(
+    graph: MotionGraph, max_clusters: int = MAX_VISIBLE_CLUSTERS, character: Character | None = None
 ) -> Clusters:
-    """Cluster the frames of a graph by what can be seen.
+    """Cluster the frames of a graph by what a camera can see.
 
     Args:
         graph: Its frames count.
-        most: Most clusters.
+        max_clusters: Most clusters.
         character: Whose motions they are, by default the product's own.
+
+    Raises:
+        UsageError: max_clusters is below 1.
     """
-    database = graph.database
-    x = sight_observations(database, character or default_character())
-    spacing = max(1, round(WALK_CYCLE_S * database.fps))
-    kept = graph.frames[spacing // 2 :: spacing]
-    kept = graph.frames if len(kept) == 0 else kept
-    fit = fit_mixture(x[kept], MixtureConfig(most=most))
-    logs = fit.mixture.log_posteriors(x)
-    labels = np.argmax(logs, axis=1).astype(np.int32)
-    examples = np.empty(len(fit.mixture), dtype=np.int32)
-    for k, mean in enumerate(fit.mixture.means):
-        distances = np.sum((x[graph.frames] - mean) ** 2, axis=1)
-        distances[labels[graph.frames] != k] += np.inf
-        examples[k] = graph.frames[np.argmin(distances)]
-    return Clusters(
-        fit.mixture, labels, logs.astype(np.float32), examples, spacing, fit.curve, fit.bounded
-    )
+    x = visible_observations(graph.database, character or default_character())
+    spacing = max(1, round(WALK_CYCLE_S * graph.database.fps))
+    return fit_clusters(graph, x, spacing, max_clusters)

@@ -11,8 +11,8 @@ from dynresp.locomotion.clusters.cluster_observations import (
     observations,
     reference_orientation,
 )
-from dynresp.locomotion.clusters.frame_clusters import ClusterConfig, Clusters
-from dynresp.locomotion.clusters.gaussian_mixture import MixtureConfig, fit_from_means
+from dynresp.locomotion.clusters.frame_clusters import Clusters
+from dynresp.locomotion.clusters.gaussian_mixture import fit_from_means
 from dynresp.locomotion.graph.frame_database import Clip, MotionDatabase
 from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -77,7 +77,7 @@ def test_neck_and_ankles_do_not_count(character: Character, rng: np.random.Gener
 
 
 @pytest.mark.parametrize("coordinates", [Coordinates.RELATIVE, Coordinates.BLOCKS])
-def test_place_and_facing_do_not_count_where_they_do_not_matter(
+def test_position_and_facing_do_not_count_in_relative_observations(
     coordinates: Coordinates, character: Character, rng: np.random.Generator
 ) -> None:
     poses = wandering_poses(rng, 40)
@@ -87,7 +87,7 @@ def test_place_and_facing_do_not_count_where_they_do_not_matter(
     np.testing.assert_allclose(a, b, atol=1e-9)
 
 
-def test_relative_observations_tell_speeds(character: Character) -> None:
+def test_relative_observations_contain_speeds(character: Character) -> None:
     frames = np.arange(60) / 15.0
     poses = np.tile(character.rest_pose, (60, 1))
     # A circle to the left, one metre across, at half a radian a second, facing along it.
@@ -106,8 +106,8 @@ def test_averages_and_speeds_do_not_cross_from_clip_to_clip(
 ) -> None:
     a, b = wandering_poses(rng, 25), wandering_poses(rng, 30)
     both = observations(database_of(a, b), Coordinates.RELATIVE, character)
-    apart = [observations(database_of(p), Coordinates.RELATIVE, character) for p in (a, b)]
-    np.testing.assert_allclose(both, np.concatenate(apart), atol=1e-9)
+    each = [observations(database_of(p), Coordinates.RELATIVE, character) for p in (a, b)]
+    np.testing.assert_allclose(both, np.concatenate(each), atol=1e-9)
 
 
 def test_the_reference_orientation_is_the_nearest_to_the_farthest(
@@ -152,10 +152,8 @@ def test_examples_are_the_closest_to_the_means(
         assert example == nearest
 
 
-def test_the_number_of_clusters_and_the_spacing_can_be_given(graph: MotionGraph) -> None:
-    config = ClusterConfig(MixtureConfig(most=3), spacing_s=0.2)
-    clusters = Clusters.of(graph, config)
-    assert clusters.spacing == 3
+def test_the_number_of_clusters_can_be_limited(graph: MotionGraph) -> None:
+    clusters = Clusters.of(graph, max_clusters=3)
     assert 1 <= len(clusters) <= 3
     assert clusters.bounded == (len(clusters) == 3)
 
@@ -172,11 +170,6 @@ def test_seeds_outside_the_graph_are_refused(graph: MotionGraph) -> None:
         Clusters.of(graph, seeds=[len(graph.database)])
 
 
-def test_a_spacing_that_makes_no_sense_is_refused() -> None:
-    with pytest.raises(UsageError, match="spacing_s"):
-        ClusterConfig(spacing_s=0.0)
-
-
 @pytest.mark.mocap
 @pytest.mark.slow
 @pytest.mark.parametrize("plan", ["walking", "playground"])
@@ -187,7 +180,7 @@ def test_seeds_need_no_hand(plan: str, motions_folder: Path, character: Characte
     x = x[graph.frames[clusters.spacing // 2 :: clusters.spacing]]
     rng = np.random.default_rng(1)
     starts = [rng.choice(len(x), len(clusters), replace=False) for _ in range(20)]
-    tried = [fit_from_means(x, x[rows], MixtureConfig()) for rows in starts]
+    tried = [fit_from_means(x, x[rows]) for rows in starts]
     own = clusters.mixture
     best = max(m.log_likelihood(x) for m in tried)
     print(

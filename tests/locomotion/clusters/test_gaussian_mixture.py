@@ -6,8 +6,8 @@ from sklearn.mixture import GaussianMixture
 from threadpoolctl import threadpool_limits
 
 from dynresp.locomotion.clusters.gaussian_mixture import (
+    MIN_DEVIATION,
     Mixture,
-    MixtureConfig,
     fit_from_means,
     fit_mixture,
 )
@@ -19,7 +19,7 @@ from tests.oracles import mixture as slow
 def blobs(
     rng: np.random.Generator, clusters: int, each: int = 40, spread: float = 0.05
 ) -> tuple[FloatArray, FloatArray]:
-    """Observations around means that lie apart, and the means."""
+    """Observations around distant means, and the means."""
     corners = np.array(np.meshgrid([0, 1], [0, 1], [0, 1], [0, 1])).reshape(4, -1).T
     means = rng.permutation(corners)[:clusters].astype(float)
     x = np.repeat(means, each, axis=0)
@@ -60,9 +60,8 @@ def test_bic_counts_what_is_estimated(rng: np.random.Generator) -> None:
 
 def test_em_ends_where_another_step_gains_nothing(rng: np.random.Generator) -> None:
     x, _ = blobs(rng, 3, each=20, spread=0.4)
-    config = MixtureConfig(least_deviation=0.02)
-    fitted = fit_from_means(x, x[[0, 25, 50]], config)
-    more = slow.em_step(fitted, x, config.least_deviation)
+    fitted = fit_from_means(x, x[[0, 25, 50]])
+    more = slow.em_step(fitted, x, MIN_DEVIATION)
     gain = slow.log_likelihood(more, x) - slow.log_likelihood(fitted, x)
     assert abs(gain) < 1e-3 * len(x)
 
@@ -78,7 +77,7 @@ def test_the_clusters_that_were_made_are_found(clusters: int, rng: np.random.Gen
     np.testing.assert_allclose(fit.mixture.variances, 0.05**2, rtol=0.5)
 
 
-def test_the_curve_is_told_and_its_best_is_chosen(rng: np.random.Generator) -> None:
+def test_the_best_point_of_the_curve_is_chosen(rng: np.random.Generator) -> None:
     x, _ = blobs(rng, 4)
     fit = fit_mixture(x)
     assert [point.clusters for point in fit.curve] == list(range(1, len(fit.curve) + 1))
@@ -90,7 +89,7 @@ def test_the_curve_is_told_and_its_best_is_chosen(rng: np.random.Generator) -> N
 
 def test_the_number_of_clusters_is_bounded(rng: np.random.Generator) -> None:
     x, _ = blobs(rng, 9)
-    fit = fit_mixture(x, MixtureConfig(most=4))
+    fit = fit_mixture(x, 4)
     assert len(fit.mixture) == 4
     assert fit.bounded
 
@@ -105,19 +104,18 @@ def test_as_likely_as_the_best_of_twenty_random_starts(seed: int) -> None:
         ]
     )
     fit = fit_mixture(x)
-    size, config = len(fit.mixture), MixtureConfig()
+    size = len(fit.mixture)
     starts = [rng.choice(len(x), size, replace=False) for _ in range(20)]
-    tried = [fit_from_means(x, x[rows], config) for rows in starts]
+    tried = [fit_from_means(x, x[rows]) for rows in starts]
     assert fit.mixture.log_likelihood(x) >= max(m.log_likelihood(x) for m in tried)
     assert fit.mixture.bic(x) >= max(m.bic(x) for m in tried)
 
 
 def test_the_same_bits_at_any_thread_count(rng: np.random.Generator) -> None:
     x = rng.normal(size=(700, 36)) * rng.uniform(0.1, 1.0, 36)
-    config = MixtureConfig(most=6)
     with threadpool_limits(limits=1):
-        one = fit_mixture(x, config)
-    two = fit_mixture(x, config)
+        one = fit_mixture(x, 6)
+    two = fit_mixture(x, 6)
     np.testing.assert_array_equal(one.mixture.means, two.mixture.means)
     np.testing.assert_array_equal(one.mixture.variances, two.mixture.variances)
 
@@ -138,21 +136,20 @@ def test_seeds_that_are_no_rows_are_refused(seeds: list[int], rng: np.random.Gen
 def test_equal_observations_are_one_cluster() -> None:
     fit = fit_mixture(np.ones((50, 3)))
     assert len(fit.mixture) == 1
-    np.testing.assert_allclose(fit.mixture.variances, MixtureConfig().least_deviation ** 2)
+    np.testing.assert_allclose(fit.mixture.variances, MIN_DEVIATION**2)
 
 
 @pytest.mark.parametrize(
     "x", [np.ones(3), np.ones((1, 3)), np.full((4, 2), np.nan)], ids=["flat", "one", "nan"]
 )
-def test_what_is_no_table_of_numbers_is_refused(x: FloatArray) -> None:
+def test_observations_of_a_wrong_shape_are_refused(x: FloatArray) -> None:
     with pytest.raises(MotionError, match="finite"):
         fit_mixture(x)
 
 
-@pytest.mark.parametrize("name", ["most", "least_observations", "least_deviation", "splits"])
-def test_settings_that_make_no_sense_are_refused(name: str) -> None:
-    with pytest.raises(UsageError, match=name):
-        MixtureConfig(**{name: 0})
+def test_less_than_one_cluster_is_refused(rng: np.random.Generator) -> None:
+    with pytest.raises(UsageError, match="max_clusters must be 1 or more, got 0"):
+        fit_mixture(blobs(rng, 2)[0], 0)
 
 
 def test_arrays_are_read_only(rng: np.random.Generator) -> None:
