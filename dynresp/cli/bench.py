@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynresp.bench.graph_parts import Part, run_part
 from dynresp.cli.options import ChosenClassifier, Json, Motions, Seed
-from dynresp.support.errors import UsageError
 
 if TYPE_CHECKING:
-    from dynresp.bench.graph_figures import GraphFigures
     from dynresp.bench.measure import BenchResult
 
 app = typer.Typer(
-    help="Measure how fast it is on this machine.",
+    help="Measure how fast dynresp is on this machine.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -95,29 +92,6 @@ def generate(motions: Motions = None, seed: Seed = None, as_json: Json = False) 
 
 @app.command()
 def graph(
-    part: Annotated[
-        Part,
-        typer.Option("--part", help="What is measured: building a graph, or what is done with it."),
-    ] = Part.build,
-    plan: Annotated[
-        str | None,
-        typer.Option(
-            "--plan",
-            metavar="PLAN",
-            help="Name or file of the graph plan to measure; by default all that the part is for "
-            "and whose motions are here. Not for build.",
-        ),
-    ] = None,
-    count: Annotated[
-        int | None,
-        typer.Option(
-            "--count",
-            min=3,
-            max=100_000_000,
-            help="Frames, moments, starts, paths, terrains or hits, as the part has them; by "
-            "default as many as its figures are stated for. Not for build and all.",
-        ),
-    ] = None,
     sizes: Annotated[
         list[int] | None,
         typer.Option(
@@ -125,76 +99,18 @@ def graph(
             min=1000,
             max=1_000_000,
             metavar="N",
-            help="With build: a further number of frames whose graph is built; may be repeated.",
+            help="Also build a graph of N frames; may be repeated.",
         ),
     ] = None,
     motions: Motions = None,
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
-    """Time to build a motion graph, against vectorised NumPy, and figures of its use."""
-    _refuse_unused(part, plan, count, sizes)
-    parts = [one for one in Part if one is not Part.all] if part is Part.all else [part]
-    results: dict[str, BenchResult | GraphFigures] = {}
-    for one in parts:
-        typer.echo(f"measuring: {one.value} ...", err=True)
-        if one is Part.build:
-            from dynresp.bench import graph_speed as bench
+    """Time to build a motion graph of 12,879 frames, beside vectorised NumPy."""
+    typer.echo("building graphs for about half a minute ...", err=True)
+    from dynresp.bench import graph_speed as bench
 
-            results[one] = bench.run(seed or 0, motions, sizes=sizes or ())
-        else:
-            results[one] = run_part(one, seed or 0, motions, plan=plan, count=count or 0)
-        if not as_json:
-            typer.echo(results[one].to_text())
-    if as_json:
-        told = {name: result.to_json() for name, result in results.items()}
-        typer.echo(json.dumps(told if part is Part.all else told[part], indent=2))
-
-
-def _refuse_unused(
-    part: Part, plan: str | None, count: int | None, sizes: list[int] | None
-) -> None:
-    """Refuse options that the part has no use for.
-
-    Raises:
-        UsageError: There is one.
-    """
-    whole = part in (Part.build, Part.all)
-    for name, given, unused in (
-        ("--plan", plan, part is Part.build),
-        ("--count", count, whole or part is Part.rules),
-        ("--sizes", sizes, not whole),
-    ):
-        if given and unused:
-            raise UsageError(f"{name} says nothing to --part {part.value}; leave it out")
-
-
-@app.command()
-def video(
-    clusters: Annotated[
-        list[int] | None,
-        typer.Option(
-            "--clusters",
-            min=2,
-            max=50,
-            metavar="K",
-            help="How many clusters at most; may be repeated. By default 5.",
-        ),
-    ] = None,
-    motions: Motions = None,
-    seed: Seed = None,
-    as_json: Json = False,
-) -> None:
-    """How well an avatar follows strangers in videos, one studio left out at a time."""
-    typer.echo("filming and watching people for about twelve minutes ...", err=True)
-    from dynresp.bench import video as bench
-    from dynresp.locomotion.vision.visible_clusters import MAX_VISIBLE_CLUSTERS
-
-    def progress(doing: str) -> None:
-        typer.echo(doing, err=True)
-
-    counts = clusters or [MAX_VISIBLE_CLUSTERS]
-    _print(bench.run(seed or 0, motions, clusters=counts, progress=progress), as_json)
+    _print(bench.run(seed or 0, motions, sizes=sizes or ()), as_json)
 
 
 def _print(result: BenchResult, as_json: bool) -> None:

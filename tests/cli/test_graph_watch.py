@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from dynresp.bench.filming import SIZE, Filming, film, write_video
-from dynresp.bench.people import Body
 from dynresp.cli import graph_watch
 from dynresp.cli.app import app
 from dynresp.locomotion.graph.graph_file import load_graph, save_graph
@@ -22,6 +20,8 @@ from dynresp.motion.builtin.builtin_motions import load_builtin
 from dynresp.motion.load import load_motion
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers.npz import read_npz
+from studies.video.filming import SIZE, Filming, film, write_video
+from studies.video.people import Body
 
 from .conftest import Command
 

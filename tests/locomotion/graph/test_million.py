@@ -8,7 +8,6 @@ import pytest
 
 from dynresp.avatar_runs.graph_building import build_graph
 from dynresp.avatar_runs.graph_spec import find_plan, read_plan
-from dynresp.bench.graph_steps import at_jumps, source_limits
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
@@ -17,6 +16,7 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import Motion
 from dynresp.support.arrays import IntArray
+from studies.graphs.speed_steps import at_jumps, source_limits
 
 pytestmark = pytest.mark.slow
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from dynresp.avatar_runs.sketch_run import standing_at
-from dynresp.bench import graph_mazes, graph_sketch
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph import placement
@@ -24,6 +23,7 @@ from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import DynrespError, UsageError
+from studies.graphs import maze_walks, sketched_paths
 from tests.locomotion.samples import walking_graph
 
 
@@ -263,8 +263,8 @@ def test_what_is_of_another_kind(straight: SearchGraph) -> None:
 @pytest.mark.slow
 @pytest.mark.mocap
 def test_smooth_paths_of_20_m_in_open_ground(walker: SearchGraph) -> None:
-    graph_sketch.warm_up(walker)
-    followed = graph_sketch.follow_smooth_paths(walker, 50, 0)
+    sketched_paths.warm_up(walker)
+    followed = sketched_paths.follow_smooth_paths(walker, 50, 0)
     for one in followed:
         assert one.walk.arrived
         assert np.hypot(*(one.walk.roots[-1, :2] - one.path[-1])) <= 0.25
@@ -273,20 +273,20 @@ def test_smooth_paths_of_20_m_in_open_ground(walker: SearchGraph) -> None:
     for one in followed[:5]:
         check_walk(walker, one.walk)
     assert np.mean([one.walk.off_path.mean() for one in followed]) < 0.12
-    assert graph_sketch.real_time_ratios([one.walk for one in followed], 15.0).min() >= 10.0
+    assert sketched_paths.real_time_ratios([one.walk for one in followed], 15.0).min() >= 10.0
 
 
 @pytest.mark.slow
 @pytest.mark.mocap
 @pytest.mark.parametrize("sketched", [True, False])
 def test_mazes(walker: SearchGraph, sketched: bool) -> None:
-    graph_sketch.warm_up(walker)
-    walked = graph_mazes.walk_mazes(walker, 20, 0, sketched)
+    sketched_paths.warm_up(walker)
+    walked = maze_walks.walk_mazes(walker, 20, 0, sketched)
     for one in walked:
         assert one.walk.arrived
         assert np.hypot(*(one.walk.roots[-1, :2] - one.maze.solution[-1])) <= 0.25
-        assert graph_mazes.clearance(walker.graph, walker.character, one) > 0.0
-    assert graph_sketch.real_time_ratios([one.walk for one in walked], 15.0).min() >= 10.0
+        assert maze_walks.clearance(walker.graph, walker.character, one) > 0.0
+    assert sketched_paths.real_time_ratios([one.walk for one in walked], 15.0).min() >= 10.0
 
 
 @pytest.mark.slow
@@ -327,7 +327,7 @@ def test_actions_chosen_by_warping_follow_a_sketch_too(walker: SearchGraph) -> N
     chooser = SketchChooser(ClusterForest(graph, Clusters.of(graph)))
     off = []
     for seed in range(5):
-        path = resampled(graph_sketch.smooth_path(np.random.default_rng(seed)), 0.1)
+        path = resampled(sketched_paths.smooth_path(np.random.default_rng(seed)), 0.1)
         heading = np.arctan2(*(path[5] - path[0])[::-1])
         start = standing(walker, 0, 0, heading)
         playback, done = Playback(graph, start.frame, start.placement), 0

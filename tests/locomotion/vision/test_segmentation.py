@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from dynresp.bench.filming import Filming, film
 from dynresp.locomotion.vision.segmentation import SegmentationConfig, Segmenter
 from dynresp.motion.motion import Motion
 from dynresp.support.errors import MotionError
+from studies.video.filming import Filming, film
 from tests.locomotion.vision.samples import stepping, waving
 from tests.locomotion.vision.video_samples import person
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynresp.bench.left_out import gather, takes_of
-from dynresp.bench.people import PEOPLE
-from dynresp.bench.video import leave_out, told
 from dynresp.motion.character import default_character
+from studies.video.cross_validation import gather, takes_of
+from studies.video.people import PEOPLE
+from studies.video.strangers import judged_together, leave_out
 
 DATABASE = (
     "snumrl_ys2010/VideoMotion/wd2_freeWalk_01.bvh",
@@ -36,7 +36,7 @@ def test_what_strangers_do_is_followed_within_a_second(motions_folder) -> None:
         for take in takes_of(person, folders, gathered.table, seed, 20.0)
     ]
     folds = leave_out("CMU", gathered, takes, 4, character)
-    figures = told(folds)
+    figures = judged_together(folds)
     assert sum(len(fold.judged.truth) for fold in folds) > 200
     assert figures["right"] > 0.8
     assert figures["balanced"] > figures["constant_balanced"] + 0.2

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from dynresp.bench.filming import Filming, film, write_video
 from dynresp.locomotion.vision.observation import Watcher
 from dynresp.locomotion.vision.video_control import VideoControl
 from dynresp.locomotion.vision.video_following import follow
 from dynresp.locomotion.vision.video_reader import Video
 from dynresp.motion.motion import Motion
 from dynresp.support.errors import UsageError
+from studies.video.filming import Filming, film, write_video
 from tests.locomotion.vision.samples import STEPPING, WAVING, stepping, waving
 from tests.locomotion.vision.video_samples import person
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from dynresp.bench.filming import SIZE, write_video
 from dynresp.locomotion.vision.video_reader import Video
 from dynresp.support.errors import MotionFileError
+from studies.video.filming import SIZE, write_video
 
 
 @pytest.mark.parametrize(("codec", "ending"), [("mp4v", "mp4"), ("MJPG", "avi")])

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dynresp.bench.people import PEOPLE
 from dynresp.motion.character import Character
+from studies.video.people import PEOPLE
 
 
 def person(name: str, folder: Path) -> Character:

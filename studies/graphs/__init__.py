@@ -1,0 +1,1 @@
+"""Studies of motion graphs and of the avatars that walk through them."""

@@ -1,0 +1,1 @@
+"""The study of avatars that follow people in videos."""
