@@ -73,7 +73,7 @@ class Outing:
         """The outing of a walk that was composed as a whole; the rest as the class takes it."""
         motion = composition.motion
         jumps_s = (composition.jumps / graph.config.fps).tolist()
-        sliding = replace(motion, poses=composition.sliding)
+        sliding = replace(motion, poses=composition.unfitted)
         return cls(motion=motion, jumps_s=jumps_s, sliding=sliding, **rest)
 
 

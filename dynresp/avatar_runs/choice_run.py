@@ -61,7 +61,7 @@ def choice_outing(
     played = 0
     while played < seconds * graph.config.fps:
         at_s = played / graph.config.fps
-        offered = choices(forest, control.frame, playback.place)
+        offered = choices(forest, control.frame, playback.placement)
         words = [in_words(action, graph.config.fps) for action in offered]
         try:
             number = pick(at_s, words)

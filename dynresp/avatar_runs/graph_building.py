@@ -70,11 +70,11 @@ def build_graph(
     laid = lay_out(plan.graph.world, motions, character)
     progress("comparing frames", 0, 1)
     config = plan.graph.config()
-    database = MotionDatabase.gather(
+    database = MotionDatabase.from_motions(
         laid.motions, character, config.fps, config.mirrored, laid.contacts, tuple(owed)
     )
     database = replace(database, world=plan.graph.world)
-    return MotionGraph.of(database, config, character, threads)
+    return MotionGraph.from_database(database, config, character, threads)
 
 
 def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.avatar_runs.avatar_run import Outing, skate
-from dynresp.locomotion.avatar.avatar import Avatar, Doing, Wanderer
+from dynresp.locomotion.avatar.avatar import Activity, Avatar, RandomPlanner
 from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import IDENTITY
@@ -67,7 +67,7 @@ def hit_outing(
     rng = np.random.default_rng(seed)
     start = int(rng.choice(graph.frames))
     crowd = AvatarCrowd(
-        character, library, graph, [Wanderer(graph, np.random.default_rng([seed, 1]))],
+        character, library, graph, [RandomPlanner(graph, np.random.default_rng([seed, 1]))],
         [(start, IDENTITY)], response=response, chooser=choosing.chooser,
     )  # fmt: skip
     avatar = crowd.avatars[0]
@@ -83,10 +83,10 @@ def hit_outing(
     motion = watcher.motion(character)
     returns = [  # of the last hundred those that are within the motion
         {
-            "after": back.after,
+            "after": back.reaction,
             # The first frame that is shown is frame 1 of the clock.
             "left_s": None if back.moment is None else (back.moment - 1) / fps,
-            "distance": None if back.way is None else back.way.distance,
+            "distance": None if back.entry is None else back.entry.distance,
         }
         for back in avatar.returns
         if back.moment is None or back.moment <= frames
@@ -207,9 +207,9 @@ class _Watcher:
             return "physics"
         if driven is Phase.BLEND:
             return "blend"
-        if driven is Phase.PLAYING and self._avatar.doing is not Doing.WALKING:
+        if driven is Phase.PLAYING and self._avatar.activity is not Activity.WALKING:
             return "reaction"
         last = self._avatar.returns[-1] if self._avatar.returns else None
-        if last is not None and last.moment is not None and last.after != CARRY_ON:
+        if last is not None and last.moment is not None and last.reaction != CARRY_ON:
             return "reaction" if self._responder.frame <= last.moment else "base motion"
         return "base motion"

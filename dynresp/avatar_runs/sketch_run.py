@@ -12,7 +12,7 @@ from dynresp.avatar_runs.terrain_run import terrain_outing
 from dynresp.avatar_runs.world_setup import TERRAIN, blocks_of
 from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.composition import compose
 from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.path_walk import SketchedWalk
@@ -114,7 +114,7 @@ def sketch_outing(
     )
 
 
-def standing_at(graph: MotionGraph, start: tuple[float, float], towards: Any) -> State:
+def standing_at(graph: MotionGraph, start: tuple[float, float], towards: Any) -> AvatarState:
     """A state at a place that faces another: a frame in which the avatar stands stillest.
 
     Args:
@@ -129,7 +129,7 @@ def standing_at(graph: MotionGraph, start: tuple[float, float], towards: Any) ->
     calm = np.where(standing, calm, calm + 100.0)
     frame = int(frames[np.argmin(calm)])
     way = np.asarray(towards) - np.asarray(start)
-    return State.at(graph, frame, *start, float(np.arctan2(way[1], way[0])))
+    return AvatarState.at(graph, frame, *start, float(np.arctan2(way[1], way[0])))
 
 
 def _refuse_inside(world: World, place: tuple[float, float], what: str) -> None:

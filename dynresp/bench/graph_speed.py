@@ -86,7 +86,7 @@ def run(
         return [pruning.jumps(block) for block in blocks]
 
     def build(config: GraphConfig, threads: int = 0) -> MotionGraph:
-        return MotionGraph.of(database, config, threads=threads)
+        return MotionGraph.from_database(database, config, threads=threads)
 
     graph, strict = build(LOOSE), build(STRICT)
     times = median_seconds(
@@ -153,7 +153,7 @@ def _check_agreement(
     """
     found = find_transitions(database, LOOSE)
     matched = found.targets - 1
-    farthest = LOOSE.farthest - _ROUNDING
+    farthest = LOOSE.max_distance - _ROUNDING
     for block in blocks:
         distances = block.distances[1:-1]
         own = (found.sources >= block.start) & (found.sources < block.start + len(distances))
@@ -186,9 +186,9 @@ def _peaks(database: MotionDatabase) -> tuple[float, float]:
     """Memory before a graph is built, everything loaded; and the highest after it [MiB]."""
     warm = database_of(database, _WARM, np.random.default_rng(0))
     with suppress(MotionError):
-        MotionGraph.of(warm, LOOSE)
+        MotionGraph.from_database(warm, LOOSE)
     before = _status_mib("VmRSS")
-    MotionGraph.of(database, LOOSE)
+    MotionGraph.from_database(database, LOOSE)
     return before, _status_mib("VmHWM")
 
 
@@ -241,7 +241,7 @@ def _growth(recorded: MotionDatabase, sizes: Sequence[int], seed: int) -> dict[s
         database = database_of(recorded, frames, np.random.default_rng(seed))
         for name, config in (("loose", LOOSE), ("strict", STRICT)):
             start = time.perf_counter()
-            graph = MotionGraph.of(database, config)
+            graph = MotionGraph.from_database(database, config)
             more[f"{name}_{frames}_s"] = time.perf_counter() - start
             more[f"{name}_{frames}_jumps"] = graph.counts.component
         for key, value in _memory(database).items():

@@ -75,7 +75,7 @@ class NumpyPruning:
         for at in range(0, len(first), _AT_ONCE):
             i, j = first[at : at + _AT_ONCE], second[at : at + _AT_ONCE]
             found = frame_distances(self.features, rows[i], j)
-            found[found > self.config.farthest] = np.inf
+            found[found > self.config.max_distance] = np.inf
             distances[rows[i] - (start - 1), j] = found
         return Block(start, distances, len(first))
 

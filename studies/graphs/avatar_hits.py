@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.locomotion.avatar.avatar import Avatar, Doing, Wanderer
+from dynresp.locomotion.avatar.avatar import Activity, Avatar, RandomPlanner
 from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import IDENTITY
@@ -56,7 +56,7 @@ def measure(
     avatars = math.ceil(count / _HITS_EACH)
     rngs = [np.random.default_rng([seed, k]) for k in range(avatars)]
     crowd = AvatarCrowd(
-        character, library, graph, [Wanderer(graph, rng) for rng in rngs],
+        character, library, graph, [RandomPlanner(graph, rng) for rng in rngs],
         [(int(rng.choice(graph.frames)), IDENTITY) for rng in rngs], response=response,
     )  # fmt: skip
     start = time.perf_counter()
@@ -66,8 +66,8 @@ def measure(
     became = Counter(what for avatar in crowd.avatars for what in _became(avatar))
     entered = became["carried on"] + became["reacted"]
     last = np.ptp(roots[-round(_LAST_S * fps) :, :, :2], axis=0).max(axis=1)
-    walking = np.array([avatar.doing is Doing.WALKING for avatar in crowd.avatars])
-    staying = np.array([avatar.doing is Doing.STAYING for avatar in crowd.avatars])
+    walking = np.array([avatar.activity is Activity.WALKING for avatar in crowd.avatars])
+    staying = np.array([avatar.activity is Activity.STAYING for avatar in crowd.avatars])
     return {
         "library": library.name,
         "avatars": avatars,
@@ -116,14 +116,14 @@ def _hit(
     broken, done, rest, frame = 0, 0, round(_REST_S * fps), 0
     while rest > 0:
         for k, avatar in enumerate(crowd.avatars):
-            if done < count and frame >= due[k] and avatar.doing is not Doing.HIT:
+            if done < count and frame >= due[k] and avatar.activity is not Activity.HIT:
                 avatar.responder.hit(some_impact(rng))
                 due[k] = frame + rng.integers(least, most)
                 done += 1
         shown = crowd.advance()
         broken += int(np.count_nonzero(~np.isfinite(shown).all(axis=1)))
         roots.append(shown[:, ROOT].copy())
-        hit.append([avatar.doing is Doing.HIT for avatar in crowd.avatars])
+        hit.append([avatar.activity is Activity.HIT for avatar in crowd.avatars])
         frame += 1
         rest -= done >= count
     return np.array(roots), np.array(hit), broken
@@ -132,7 +132,11 @@ def _hit(
 def _became(avatar: Avatar) -> list[str]:
     """What became of the hits that were answered."""
     return [
-        "stayed" if back.moment is None else "carried on" if back.after == CARRY_ON else "reacted"
+        "stayed"
+        if back.moment is None
+        else "carried on"
+        if back.reaction == CARRY_ON
+        else "reacted"
         for back in avatar.returns
     ]
 
@@ -156,7 +160,7 @@ def _returns(
         free = ~(hit[1:, k] | hit[:-1, k])
         for back in avatar.returns:
             if back.moment is not None:
-                waits.append((back.moment - back.laid) / fps)
+                waits.append((back.moment - back.decided) / fps)
                 # The first frame that is shown is frame 1 of the clock.
                 second = slice(max(back.moment - 1, 0), back.moment - 1 + round(fps))
                 leaps.append(float(ways[second][free[second]].max(initial=0.0)))

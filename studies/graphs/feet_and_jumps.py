@@ -82,7 +82,7 @@ class _Seen:
         rate = fps / graph.config.fps
         for at in range(0, len(path) - 2, _STRETCH):
             made = compose(graph, character, path[at : at + _STRETCH], fps=fps)
-            stages = {BLENDED: made.sliding, FITTED: made.motion.poses}
+            stages = {BLENDED: made.unfitted, FITTED: made.motion.poses}
             if rate == 1.0:
                 stages[CUT] = place_poses(graph.database.poses[made.frames], made.placements)
             for stage, poses in stages.items():

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynresp.avatar_runs.sketch_run import standing_at
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.path_walk import SketchConfig, SketchedWalk
 from dynresp.locomotion.sketch.sketch_control import follow_sketch
@@ -75,7 +75,7 @@ def follow_smooth_paths(search: SearchGraph, count: int, seed: int) -> list[Foll
     return out
 
 
-def standing_on(graph: MotionGraph, path: FloatArray, faced: int) -> State:
+def standing_on(graph: MotionGraph, path: FloatArray, faced: int) -> AvatarState:
     """Standing at the beginning of a path (k, 2), and facing a later corner of it."""
     return standing_at(graph, (float(path[0, 0]), float(path[0, 1])), path[faced])
 

@@ -45,7 +45,7 @@ def source_limits_at(graph: MotionGraph, character: Character, fps: float) -> Fl
     for clip in graph.database.clips:
         if clip.stop - clip.start > 1:
             frames = np.arange(clip.start, clip.stop)
-            poses = compose(graph, character, frames, fps=fps).sliding
+            poses = compose(graph, character, frames, fps=fps).unfitted
             clips.append(Motion(poses, fps, clip.name))
     return _percentiles(clips)
 

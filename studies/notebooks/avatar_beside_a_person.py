@@ -31,9 +31,9 @@ from matplotlib import pyplot as plt
 
 from dynresp.avatar_runs.world_setup import blocks_of
 from dynresp.locomotion.graph.frame_distance import frame_distances, frame_features
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.composition import compose
-from dynresp.locomotion.playing.gait_measures import gait_of, ground_speeds
+from dynresp.locomotion.playing.gait_measures import ground_speeds, measure_gait
 from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.sketch_control import follow_sketch
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
@@ -137,7 +137,7 @@ def starting_like(person):
     unlike = frame_distances(features, 0, np.arange(1, len(branches) + 1))
     best = int(np.argmin(unlike))
     yaw = float(rotations.yaw_of(person.root_quaternions[0]))
-    state = State.at(graph, int(branches[best]), *person.root_positions[0, :2], yaw)
+    state = AvatarState.at(graph, int(branches[best]), *person.root_positions[0, :2], yaw)
     return state, float(unlike[best])
 
 
@@ -174,7 +174,7 @@ HEADINGS = {
 
 def measured(name, motion):
     """Figures of a walk, in the order of the headings."""
-    gait, track = gait_of(motion, character), motion.root_positions[:, :2]
+    gait, track = measure_gait(motion, character), motion.root_positions[:, :2]
     yaws = rotations.yaw_of(motion.root_quaternions)
     velocities = np.gradient(track, axis=0) * FPS
     speeds = np.hypot(*velocities.T)
@@ -249,7 +249,7 @@ for axes, name in zip(cells.flat, shown, strict=False):
     made = between[name][1].motion
     axes.plot(*made.root_positions[:, :2].T, color=study.RED, lw=1.2, label="avatar, between boxes")
     if made.duration < 10.0:
-        graphs.soles(axes, gait_of(made, character))
+        graphs.soles(axes, measure_gait(made, character))
     axes.set_title(name)
 handles, labels = cells[0, 0].get_legend_handles_labels()
 fig.legend(handles, labels, loc="outside lower right", ncols=3)
@@ -266,7 +266,7 @@ for axes, (said, motion) in zip(
 ):
     graphs.ground(axes, blocks_of(worlds[name]))
     axes.plot(*motion.root_positions[:, :2].T, color=study.GREY, lw=1)
-    graphs.soles(axes, gait_of(motion, character))
+    graphs.soles(axes, measure_gait(motion, character))
     axes.set_title(f"{name}: {said}")
     axes.set(xlabel="x [m]")
 plt.show()

@@ -39,7 +39,7 @@ from dynresp.locomotion.clusters.cluster_observations import observations
 from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import compose
-from dynresp.locomotion.playing.gait_measures import gait_of
+from dynresp.locomotion.playing.gait_measures import measure_gait
 from dynresp.motion.character import default_character
 from dynresp.motion.feet.skating import foot_skates
 
@@ -299,7 +299,7 @@ for axes, (name, outing) in zip(cells, outings.items(), strict=True):
     graphs.ground(axes, outing.blocks)
     for line in outing.paths:
         axes.plot(*line.points.T, color=study.GREY, lw=5, alpha=0.5)
-    graphs.soles(axes, gait_of(motion, character))
+    graphs.soles(axes, measure_gait(motion, character))
     axes.plot(*motion.root_positions[:, :2].T, color=study.RED, lw=1)
     axes.set(xlabel="x [m]", ylabel="y [m]")
     off = f"{100 * told['off_path_mean_m']:.0f} cm off on average, {100 * told['off_path_worst_m']:.0f} at worst"

@@ -112,7 +112,7 @@ def gather(people: Sequence[Person], folders: Sequence[Path], character: Charact
             whose.append(number)
     # One after the other: a copy of a motion drops out of the database.
     names = [replace(m, name=f"{k} {m.name}") for k, m in enumerate(motions)]
-    database = MotionDatabase.gather(names, character)
+    database = MotionDatabase.from_motions(names, character)
     of_clip = np.array([whose[int(clip.name.split(" ", 1)[0])] for clip in database.clips])
     table = ViewTable.of(database, FeatureConfig(components=_ALL_COMPONENTS), character=character)
     owners = of_clip[database.clip_of].astype(np.int32)

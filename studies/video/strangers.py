@@ -172,7 +172,7 @@ def leave_out(
         seed: Of what is learnt, and of where avatars begin.
     """
     database, table, translated = gathered.without(studio)
-    graph = MotionGraph.of(database, GRAPH, character)
+    graph = MotionGraph.from_database(database, GRAPH, character)
     clusters = find_visible_clusters(graph, most, character)
     commonest = int(np.bincount(clusters.labels[graph.frames]).argmax())
     forest = ClusterForest(graph, clusters)
@@ -185,7 +185,7 @@ def leave_out(
             continue
         parts, choosing_s = [], 0.0
         for take in own:
-            acted = MotionDatabase.gather([take.truth], character, table.fps)
+            acted = MotionDatabase.from_motions([take.truth], character, table.fps)
             truth = clusters.mixture.labels(visible_observations(acted, character))
             control = VideoControl(forest, table, recogniser)
             seen, start = translated(take), int(rng.choice(graph.frames))

@@ -24,7 +24,7 @@ def along(forest: ClusterForest, frames: list[int], place: npt.ArrayLike) -> lis
     graph, clip, states = forest.graph, np.asarray(place, dtype=np.float64), []
     for k, frame in enumerate(frames):
         if k > 0:
-            move = graph.placement_between([frames[k - 1]], [frame])[0]
+            move = graph.placements_between([frames[k - 1]], [frame])[0]
             clip = placement.compose(clip, move)
         states.append(placement.compose(clip, graph.database.planar[frame]))
     return states

@@ -146,7 +146,7 @@ def transitions(
     return [(i, j + 1) for i, j in best], counts
 
 
-def keeps_its_feet(
+def feet_stay_planted(
     database: MotionDatabase, source: int, target: int, config: GraphConfig, character: Character
 ) -> bool:
     """Whether no foot that stands through a whole blend would have to slip too far for it."""

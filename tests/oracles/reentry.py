@@ -46,7 +46,7 @@ def left_at(found: list[Found], times: FloatArray, config: ReentryConfig) -> int
     """The moment at which a motion is left for the graph; None where it ends out of reach."""
     best, least = None, np.inf
     for moment, (it, time) in enumerate(zip(found, times, strict=True)):
-        if it.distance > config.farthest:
+        if it.distance > config.max_distance:
             best, least = None, np.inf
             continue
         cost = it.distance + config.waiting * time

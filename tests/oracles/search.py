@@ -13,7 +13,7 @@ import numpy as np
 
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.sketch.path_search import SearchConfig
 from dynresp.locomotion.worlds.obstacles import World
@@ -150,7 +150,7 @@ class Search:
                 return out
             out.append(int(row[0]))
 
-    def run(self, start: State, progress: float, budget: int) -> tuple[list[int], bool, int]:
+    def run(self, start: AvatarState, progress: float, budget: int) -> tuple[list[int], bool, int]:
         """The frames of the best way, whether it arrives, and how many ways were looked at."""
         graph, config = self.graph, self.config
         database = graph.database

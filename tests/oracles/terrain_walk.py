@@ -7,7 +7,7 @@ and feet that need not be drawn in.
 import numpy as np
 
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.locomotion.worlds.world_contacts import sole_corners
@@ -36,7 +36,7 @@ def block_of(terrain: Terrain, sole: FloatArray, place: FloatArray) -> tuple[int
     return tuple(terrain.cells(placed(sole, place).mean(axis=0)).tolist())
 
 
-def reachable(graph: TerrainGraph, terrain: Terrain, start: State) -> list[FloatArray]:
+def reachable(graph: TerrainGraph, terrain: Terrain, start: AvatarState) -> list[FloatArray]:
     """(4,) roots of all states that can be reached."""
     database = graph.graph.database
     contacts = database.contacts[:, :2]

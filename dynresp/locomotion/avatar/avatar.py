@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.avatar.graph_entry import ReentryPlanner, WayBack
+from dynresp.locomotion.avatar.graph_entry import GraphEntry, ReentryPlanner
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import random_walk
@@ -37,7 +37,7 @@ _RETURNS = 100
 class Planner(Protocol):
     """What says where an avatar goes."""
 
-    def way(self, frame: int, place: FloatArray, count: int) -> IntArray:
+    def next_frames(self, frame: int, place: FloatArray, count: int) -> IntArray:
         """Where to go on.
 
         Args:
@@ -50,7 +50,7 @@ class Planner(Protocol):
         """
 
 
-class Wanderer:
+class RandomPlanner:
     """Goes by the graph's probabilities (eq. 1)."""
 
     def __init__(self, graph: MotionGraph, rng: np.random.Generator) -> None:
@@ -58,8 +58,8 @@ class Wanderer:
         self._graph = graph
         self._rng = rng
 
-    def way(self, frame: int, place: FloatArray, count: int) -> IntArray:
-        """See `Planner.way`."""
+    def next_frames(self, frame: int, place: FloatArray, count: int) -> IntArray:
+        """See `Planner.next_frames`."""
         return random_walk(self._graph, count, self._rng, frame)
 
 
@@ -87,7 +87,7 @@ class AvatarConfig:
                 raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
 
 
-class Doing(Enum):
+class Activity(Enum):
     """What an avatar does."""
 
     WALKING = "walking"
@@ -100,20 +100,20 @@ class Doing(Enum):
 
 
 @dataclass(frozen=True)
-class Return:
+class GraphReturn:
     """How an avatar came back from a reaction, or did not.
 
     Attributes:
-        laid: The frame of the clock in which it was found out.
-        moment: The frame of the clock at which the reaction is left; None for one that is not.
-        way: The frame of the graph that is entered, and how unlike they are.
-        after: Name of what was left, a reaction or `carry_on`.
+        decided: Frame of the clock in which it was decided.
+        moment: Frame of the clock at which the reaction is left; None if the avatar stays.
+        entry: Where the graph is entered; None if the avatar stays.
+        reaction: Name of the reaction that is left; `carry_on` or "nothing" if there was none.
     """
 
-    laid: int
+    decided: int
     moment: int | None
-    way: WayBack | None
-    after: str
+    entry: GraphEntry | None
+    reaction: str
 
 
 class Avatar:
@@ -147,8 +147,8 @@ class Avatar:
         """
         self.responder = responder
         self.planner = planner
-        self.returns: deque[Return] = deque(maxlen=_RETURNS)
-        self.doing = Doing.WALKING
+        self.returns: deque[GraphReturn] = deque(maxlen=_RETURNS)
+        self.activity = Activity.WALKING
         self._character = character
         self._reentry = reentry
         self._graph = reentry.graph
@@ -177,20 +177,20 @@ class Avatar:
         None while it does not show its way through the graph: while something approaches it is
         simulated already, if held by the pelvis, and a reaction stands as it does.
         """
-        shown = self.doing is Doing.WALKING and self.responder.phase is Phase.PLAYING
+        shown = self.activity is Activity.WALKING and self.responder.phase is Phase.PLAYING
         return self._stream.standing(self.responder.frame) if shown and self._stream else None
 
-    def keep_on(self) -> None:
+    def plan_ahead(self) -> None:
         """Plan what is needed before the responder's next frame."""
         responder = self.responder
         if responder.takeovers != self._seen:
-            self.doing = Doing.HIT
+            self.activity = Activity.HIT
             if responder.phase not in (Phase.BLEND, Phase.PLAYING):
                 return
             self._seen = responder.takeovers
             self._come_back()
         if responder.phase is Phase.PHYSICS:
-            self.doing = Doing.HIT
+            self.activity = Activity.HIT
         elif self._stream is not None:
             self._feed(self._stream)
 
@@ -214,7 +214,7 @@ class Avatar:
         """
         self.planner = planner
         free = self.responder.free_from
-        if self.doing is not Doing.WALKING or self._stream is None or free is None:
+        if self.activity is not Activity.WALKING or self._stream is None or free is None:
             return
         branch = self._stream.branch(max(self.responder.frame, free - 1))
         if branch is not None:
@@ -233,7 +233,7 @@ class Avatar:
         until = max(until, stream.end) + round(self._config.piece_s * fps)
         while stream.end < until:
             count = int(np.ceil((until - stream.end) / fps * self._graph.database.fps))
-            stream.extend(self.planner.way(stream.frame, stream.place, count))
+            stream.extend(self.planner.next_frames(stream.frame, stream.placement, count))
         self._play(stream)
 
     def _play(self, stream: Stream) -> None:
@@ -263,16 +263,16 @@ class Avatar:
         )
         after = flight.choice.name if flight.choice is not None else "nothing"
         if way is None:
-            self.returns.append(Return(responder.frame, None, None, after))
-            self._stream, self.doing = None, Doing.STAYING
+            self.returns.append(GraphReturn(responder.frame, None, None, after))
+            self._stream, self.activity = None, Activity.STAYING
             return
         row = int(moments[way.moment])
         before = slice(0, row + 1)
-        self.returns.append(Return(responder.frame, begin + row, way, after))
+        self.returns.append(GraphReturn(responder.frame, begin + row, way, after))
         self._stream = self._stream_from(
             way.frame, begin, poses[before], velocities[row], contacts[before]
         )
-        self.doing = Doing.WALKING
+        self.activity = Activity.WALKING
         before_choice = way.detour if len(way.detour) else self._recorded(way.frame)
         if len(before_choice):
             self._stream.extend(before_choice)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Planner, Wanderer
+from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Planner, RandomPlanner
 from dynresp.locomotion.avatar.graph_entry import ReentryPlanner
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -110,7 +110,9 @@ class AvatarCrowd:
         """
         rng = np.random.default_rng(seed)
         starts = [(int(rng.choice(graph.frames)), placement.IDENTITY) for _ in range(count)]
-        planners = [Wanderer(graph, np.random.default_rng([seed, k + 1])) for k in range(count)]
+        planners = [
+            RandomPlanner(graph, np.random.default_rng([seed, k + 1])) for k in range(count)
+        ]
         return cls(default_character(), library, graph, planners, starts)
 
     def advance(self) -> FloatArray:
@@ -120,5 +122,5 @@ class AvatarCrowd:
             (avatars, 59) what they show.
         """
         for avatar in self.avatars:
-            avatar.keep_on()
+            avatar.plan_ahead()
         return self.crowd.advance()

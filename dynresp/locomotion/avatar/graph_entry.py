@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynresp.locomotion.avatar.pose_index import EntryIndex, Nearest
 from dynresp.locomotion.graph import placement
-from dynresp.locomotion.graph.motion_graph import MotionGraph, between
+from dynresp.locomotion.graph.motion_graph import MotionGraph, placements_between
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.feet import legs
@@ -25,8 +25,8 @@ class ReentryConfig:
     """When a motion may go over into a graph.
 
     Attributes:
-        farthest: Largest distance (eq. 2) at which the graph is within reach. Somebody who lies is
-            farther from all who walk, and one who stands in a guard, or still sways, is nearer.
+        max_distance: Largest distance (eq. 2) at which the graph is within reach. Who lies is
+            farther from all who walk; who stands in a guard, or still sways, is nearer.
         farthest_lying: Largest distance to a frame from which a recorded way leads back there.
         waiting: What a second of waiting costs, as a distance [1/s].
         other_feet: What it costs, as a distance, if other feet stand.
@@ -37,7 +37,7 @@ class ReentryConfig:
         candidates: So many frames are considered for each moment.
     """
 
-    farthest: float = 1.2
+    max_distance: float = 1.2
     farthest_lying: float = 1.7
     waiting: float = 0.02
     other_feet: float = 0.3
@@ -50,7 +50,7 @@ class ReentryConfig:
         Raises:
             UsageError: One is negative or not finite, or there is no candidate.
         """
-        for name in ("farthest", "farthest_lying", "waiting", "other_feet", "apart"):
+        for name in ("max_distance", "farthest_lying", "waiting", "other_feet", "apart"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise UsageError(f"{name} must be at least 0, got {getattr(self, name)}")
         if self.candidates < 1:
@@ -58,7 +58,7 @@ class ReentryConfig:
 
 
 @dataclass(frozen=True, eq=False)
-class WayBack:
+class GraphEntry:
     """How a motion goes over into a graph.
 
     Attributes:
@@ -120,7 +120,7 @@ class ReentryPlanner:
         velocities: FloatArray,
         contacts: npt.NDArray[np.bool_],
         times: FloatArray,
-    ) -> WayBack | None:
+    ) -> GraphEntry | None:
         """Where the graph is entered: distance and waiting together cost least.
 
         A motion is not left before a moment at which the graph is out of reach: it is falling then,
@@ -136,13 +136,17 @@ class ReentryPlanner:
             None where no way leads from the last moment to the graph.
         """
         config = self.config
-        seen = self.entries.nearest(poses, velocities, contacts, config.farthest)
-        far = np.flatnonzero(seen.distances > config.farthest)
+        seen = self.entries.nearest(poses, velocities, contacts, config.max_distance)
+        far = np.flatnonzero(seen.distances > config.max_distance)
         first = int(far[-1]) + 1 if len(far) else 0
         if first < len(poses):
             late = slice(first, len(poses))
             near = self.entries.several(
-                poses[late], velocities[late], contacts[late], config.candidates, config.farthest
+                poses[late],
+                velocities[late],
+                contacts[late],
+                config.candidates,
+                config.max_distance,
             )
             costs = near.distances + config.waiting * times[late, None]
             costs += np.where(near.same_contacts, 0.0, config.other_feet)
@@ -174,7 +178,7 @@ class ReentryPlanner:
         )[used.reshape(shape)]
         own = legs.ankle_positions(self._character, self._character.kinematics(poses))[:, None]
         rows = np.repeat(np.arange(len(poses)), shape[1])
-        places = between(
+        places = placements_between(
             placement.of_poses(poses)[rows], database.planar[frames.ravel()], self.graph.config
         ).reshape(*shape, 1, 4)
         there = rotations.rotate(rotations.from_yaw(places[..., 3]), ankles) + places[..., :3]
@@ -184,9 +188,9 @@ class ReentryPlanner:
     @staticmethod
     def _way(
         seen: Nearest, row: int | tuple[np.intp, ...], moment: int, detour: IntArray
-    ) -> WayBack:
+    ) -> GraphEntry:
         """The way back of one entry of what was looked up, and the moment it belongs to."""
-        return WayBack(
+        return GraphEntry(
             moment,
             int(seen.frames[row]),
             float(seen.distances[row]),
@@ -212,9 +216,9 @@ class ReentryPlanner:
                     database.poses[rows],
                     database.velocities[rows],
                     database.contacts[rows, :2],
-                    self.config.farthest,
+                    self.config.max_distance,
                 )
-                far = np.flatnonzero(seen.distances > self.config.farthest)
+                far = np.flatnonzero(seen.distances > self.config.max_distance)
                 after = int(database.successors[stop - 1])
                 if not len(far):
                     continue

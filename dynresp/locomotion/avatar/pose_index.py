@@ -97,7 +97,7 @@ class EntryIndex:
         poses: FloatArray,
         velocities: FloatArray,
         contacts: npt.NDArray[np.bool_],
-        farthest: float = np.inf,
+        max_distance: float = np.inf,
     ) -> Nearest:
         """The frame that resembles each pose most, of those in which the same feet stand.
 
@@ -107,8 +107,8 @@ class EntryIndex:
             poses: (m, 59).
             velocities: (m, 45) rows of `qvel`.
             contacts: (m, 2) whether the left and the right foot stand.
-            farthest: What is not nearer than this is not near enough; and where nothing is, it need
-                not be the nearest that is told.
+            max_distance: Frames farther than this are not near enough. Where no frame is near
+                enough, the one returned need not be the nearest.
         """
         features, sketch, standing = self._laid_out(poses, velocities, contacts)
         places, distances = np.zeros(len(sketch), np.intp), np.full(len(sketch), np.inf)
@@ -116,12 +116,12 @@ class EntryIndex:
         def look_up(rows: npt.NDArray[np.intp], state: int) -> None:
             if len(rows) and len(self._places[state]):
                 for block in np.array_split(rows, -(-len(rows) // _BLOCK)):
-                    found = self._look_up(features, sketch, block, state, farthest)
+                    found = self._look_up(features, sketch, block, state, max_distance)
                     places[block], distances[block] = found
 
         for state in range(_FEET + 1):
             look_up(np.flatnonzero(standing == state), state)
-        same = np.isfinite(distances) & (distances <= farthest)
+        same = np.isfinite(distances) & (distances <= max_distance)
         look_up(np.flatnonzero(~same), _FEET + 1)
         return Nearest(self.frames[places], distances, same)
 
@@ -131,7 +131,7 @@ class EntryIndex:
         velocities: FloatArray,
         contacts: npt.NDArray[np.bool_],
         count: int,
-        farthest: float = np.inf,
+        max_distance: float = np.inf,
     ) -> Nearest:
         """Some frames that resemble each pose: the nearest, and others that hardly do less.
 
@@ -142,12 +142,12 @@ class EntryIndex:
             velocities: (m, 45) rows of `qvel`.
             contacts: (m, 2) whether the left and the right foot stand.
             count: How many for each, 1 or more; where there are fewer, the nearest is repeated.
-            farthest: See `nearest`.
+            max_distance: See `nearest`.
 
         Returns:
             (m, count) each; the nearest is the first.
         """
-        best = self.nearest(poses, velocities, contacts, farthest)
+        best = self.nearest(poses, velocities, contacts, max_distance)
         features, sketch, standing = self._laid_out(poses, velocities, contacts)
         standing = np.where(best.same_contacts, standing, _FEET + 1)
         frames = np.repeat(best.frames[:, None], count, axis=1)
@@ -189,13 +189,13 @@ class EntryIndex:
         sketch: npt.NDArray[np.float32],
         rows: npt.NDArray[np.intp],
         state: int,
-        farthest: float,
+        max_distance: float,
     ) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """Place and distance of what is nearest to some poses, of the frames of a state."""
         least = self._bounds(sketch[rows], state)
         first = least.argmin(axis=1)
         bound = self._distances(features, rows, self._places[state][first])
-        close = least <= np.minimum(bound, farthest)[:, None]
+        close = least <= np.minimum(bound, max_distance)[:, None]
         close[np.arange(len(rows)), first] = True
         moment, column = np.nonzero(close)
         found = self._distances(features, rows[moment], self._places[state][column])

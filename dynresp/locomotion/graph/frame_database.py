@@ -83,14 +83,14 @@ class MotionDatabase:
             object.__setattr__(self, name, array)
 
     @classmethod
-    def gather(
+    def from_motions(
         cls,
         motions: Sequence[Motion],
         character: Character,
         fps: float = 15.0,
         mirrored: bool = False,
         contacts: Sequence[BoolArray] | None = None,
-        owed_to: tuple[str, ...] = (),
+        credit_lines: tuple[str, ...] = (),
     ) -> MotionDatabase:
         """Bring motions to one frame rate and lay them end to end.
 
@@ -104,7 +104,7 @@ class MotionDatabase:
             mirrored: Whether every motion is followed by its mirror image.
             contacts: For each motion (frames, 2 or 4) what touches the environment, at the
                 motion's own rate; by default the motions' foot contacts.
-            owed_to: `credits` of the database.
+            credit_lines: `credits` of the database.
 
         Raises:
             MotionError: What was given are no motions, or there is none long enough.
@@ -154,7 +154,7 @@ class MotionDatabase:
             fps,
             tuple(clips),
             character.identity,
-            owed_to,
+            credit_lines,
         )
 
     def __len__(self) -> int:

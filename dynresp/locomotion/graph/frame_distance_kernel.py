@@ -95,7 +95,7 @@ def close_pairs(
     turned,
     cell,
     bound,
-    farthest,
+    max_distance,
 ):
     """Pairs (i, j), j not before i, of frames of one group that are no farther apart than allowed.
 
@@ -116,7 +116,7 @@ def close_pairs(
             out of `packed`.
         cell: (3,) size of a block [m].
         bound: Largest squared distance of sketches.
-        farthest: Largest distance.
+        max_distance: Largest distance.
 
     Returns:
         Where rows begin (stop - first + 1,), the frames j, and the distances.
@@ -166,6 +166,6 @@ def close_pairs(
                         total += apart * apart + faster * faster
                 columns[found] = frame_of[place]
                 distances[found] = total
-                found += total <= farthest
+                found += total <= max_distance
         offsets[i - first + 1] = found
     return offsets, columns[:found].copy(), distances[:found].copy()

@@ -135,6 +135,6 @@ class GraphConfig:
         return not self.contact_change if self.local_maxima is None else self.local_maxima
 
     @property
-    def farthest(self) -> float:
+    def max_distance(self) -> float:
         """Largest distance of a jump that the second rule keeps."""
         return -self.sigma * math.log(self.least_probability)

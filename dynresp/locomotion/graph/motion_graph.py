@@ -89,7 +89,7 @@ class MotionGraph:
         config: GraphConfig | None = None,
         character: Character | None = None,
         contacts: Sequence[BoolArray] | None = None,
-        owed_to: tuple[str, ...] = (),
+        credit_lines: tuple[str, ...] = (),
         threads: int = 0,
     ) -> MotionGraph:
         """Make a graph of motions.
@@ -98,8 +98,8 @@ class MotionGraph:
             motions: At any frame rate.
             config: Settings.
             character: Whose motions they are, by default the product's own.
-            contacts: See `MotionDatabase.gather`.
-            owed_to: `MotionDatabase.credits`.
+            contacts: See `MotionDatabase.from_motions`.
+            credit_lines: `MotionDatabase.credits`.
             threads: Threads, 0 for all cores; the graph is the same bit for bit.
 
         Raises:
@@ -107,13 +107,13 @@ class MotionGraph:
         """
         config = config or GraphConfig()
         character = character or default_character()
-        database = MotionDatabase.gather(
-            motions, character, config.fps, config.mirrored, contacts, owed_to
+        database = MotionDatabase.from_motions(
+            motions, character, config.fps, config.mirrored, contacts, credit_lines
         )
-        return cls.of(database, config, character, threads)
+        return cls.from_database(database, config, character, threads)
 
     @classmethod
-    def of(
+    def from_database(
         cls,
         database: MotionDatabase,
         config: GraphConfig | None = None,
@@ -141,7 +141,9 @@ class MotionGraph:
             )
         found = find_transitions(database, config, threads)
         sources, targets, distances = found.sources, found.targets, found.distances
-        kept = keeps_its_feet(database, config, character or default_character(), sources, targets)
+        kept = feet_stay_planted(
+            database, config, character or default_character(), sources, targets
+        )
         sources, targets, distances = sources[kept], targets[kept], distances[kept]
         footing = len(sources)
         inside = _largest_component(database.successors, sources, targets)
@@ -199,9 +201,9 @@ class MotionGraph:
     @functools.cached_property
     def placements(self) -> FloatArray:
         """(m, 4) where the clip of a way's target is put, seen from the clip of its source."""
-        return frozen(self.placement_between(self.sources, self.targets))
+        return frozen(self.placements_between(self.sources, self.targets))
 
-    def placement_between(self, sources: npt.ArrayLike, targets: npt.ArrayLike) -> FloatArray:
+    def placements_between(self, sources: npt.ArrayLike, targets: npt.ArrayLike) -> FloatArray:
         """Where the clip of a target is put, seen from the clip of the frame before it.
 
         Args:
@@ -217,11 +219,13 @@ class MotionGraph:
         if self.config.coordinates is Coordinates.FIXED or not jumps.any():
             return out
         planar = self.database.planar
-        out[jumps] = between(planar[left[jumps]], planar[entered[jumps] - 1], self.config)
+        out[jumps] = placements_between(
+            planar[left[jumps]], planar[entered[jumps] - 1], self.config
+        )
         return out
 
 
-def between(left: FloatArray, matched: FloatArray, config: GraphConfig) -> FloatArray:
+def placements_between(left: FloatArray, matched: FloatArray, config: GraphConfig) -> FloatArray:
     """Placements that lay frames over others as the coordinates allow.
 
     Args:
@@ -247,7 +251,7 @@ def between(left: FloatArray, matched: FloatArray, config: GraphConfig) -> Float
     return turns
 
 
-def keeps_its_feet(
+def feet_stay_planted(
     database: MotionDatabase,
     config: GraphConfig,
     character: Character,
@@ -278,7 +282,7 @@ def keeps_its_feet(
     if len(across) == 0:
         return kept
     left, matched = sources[across], targets[across] - 1
-    moves = between(database.planar[left], database.planar[matched], config)
+    moves = placements_between(database.planar[left], database.planar[matched], config)
     ankles = legs.ankle_positions(character, character.kinematics(database.poses))
     turns = rotations.from_yaw(moves[:, 3])
     for foot in range(len(FEET)):

@@ -133,7 +133,7 @@ class _Search:
     yaws: _Single
     turned: _Single
     cell: _Single
-    farthest: float
+    max_distance: float
     stutter: int
     keeps_local_maxima: bool
     contact: int
@@ -161,7 +161,7 @@ class _Search:
             yaws=features.yaws[frame_of].astype(np.float32),
             turned=turned,
             cell=features.cell.astype(np.float32),
-            farthest=config.farthest,
+            max_distance=config.max_distance,
             stutter=stutter,
             keeps_local_maxima=config.keeps_local_maxima,
             contact=_count_pairs(groups, database.clip_of, stutter),
@@ -182,7 +182,8 @@ class _Search:
         first, stop = max(rows[0] - 1, 0), min(rows[1] + 1, len(self.clip_of))
         offsets, second, distances = close_pairs(
             first, stop, self.place_of, self.group_stops, self.frame_of, self.sketch, self.packed,
-            self.yaws, self.turned, self.cell, self.farthest * _SLACK + _FLOOR, self.farthest,
+            self.yaws, self.turned, self.cell, self.max_distance * _SLACK + _FLOOR,
+            self.max_distance,
         )  # fmt: skip
         own = slice(offsets[rows[0] - first], offsets[rows[1] - first])
         frames = np.arange(first, stop, dtype=np.int32)

@@ -13,7 +13,7 @@ from dynresp.support.errors import UsageError
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class AvatarState:
     """Where an avatar is.
 
     Attributes:
@@ -29,7 +29,7 @@ class State:
     displacement: FloatArray | None = None
 
     @classmethod
-    def at(cls, graph: MotionGraph, frame: int, x: float, y: float, yaw: float) -> State:
+    def at(cls, graph: MotionGraph, frame: int, x: float, y: float, yaw: float) -> AvatarState:
         """The state in which a frame's root is somewhere.
 
         Args:

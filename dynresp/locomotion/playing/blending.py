@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.graph.motion_graph import MotionGraph, between
+from dynresp.locomotion.graph.motion_graph import MotionGraph, placements_between
 from dynresp.locomotion.graph.placement import IDENTITY, of_poses, place_poses, place_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray, IntArray
@@ -48,7 +48,7 @@ class Playback:
     Attributes:
         graph: Whose frames.
         frame: The frame played last.
-        place: (4,) where its clip is put.
+        placement: (4,) where its clip is put.
     """
 
     def __init__(self, graph: MotionGraph, frame: int, place: npt.ArrayLike = IDENTITY) -> None:
@@ -61,7 +61,7 @@ class Playback:
         """
         self.graph = graph
         self.frame = frame
-        self.place = np.array(place, dtype=np.float64)
+        self.placement = np.array(place, dtype=np.float64)
         self._offset, self._rate = np.zeros(45), np.zeros(45)
         self._age = np.array([graph.config.blend_s])
 
@@ -81,10 +81,10 @@ class Playback:
 
         database = graph.database
         planar = of_poses(pose[None])
-        place = between(planar, database.planar[frame : frame + 1], graph.config)[0]
+        place = placements_between(planar, database.planar[frame : frame + 1], graph.config)[0]
         playback = cls(graph, frame, place)
         displacement_kernel(
-            np.ascontiguousarray(pose), np.ascontiguousarray(velocity), playback.place,
+            np.ascontiguousarray(pose), np.ascontiguousarray(velocity), playback.placement,
             database.poses[frame], database.velocities[frame], playback._offset, playback._rate,
         )  # fmt: skip
         playback._age[0] = 0.0
@@ -119,14 +119,14 @@ class Playback:
         if (jumps & first).any():
             frame = int(entered[np.argmax(jumps & first)])
             raise MotionError(f"no jump can lead to frame {frame}, the first of its clip")
-        moves = self.graph.placement_between(left, entered)
+        moves = self.graph.placements_between(left, entered)
         count = len(entered)
         poses, placements = np.empty((count, 59)), np.empty((count, 4))
         moving = np.empty((count, 45))
         play_kernel(
             database.poses, database.velocities, path, jumps, moves, database.fps, config.blend_s,
             config.blend_rate_s,
-            self.place, self._offset, self._rate, self._age, poses, placements,
+            self.placement, self._offset, self._rate, self._age, poses, placements,
             moving,
         )  # fmt: skip
         self.frame = int(path[-1])

@@ -11,7 +11,7 @@ from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import IDENTITY
 from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
-from dynresp.locomotion.playing.stance_steps import stand_between
+from dynresp.locomotion.playing.stance_steps import keep_feet_planted
 from dynresp.motion.character import POSE_SIZE, Character
 from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP, ComposedMotion, fit_feet
 from dynresp.motion.motion import Motion, interpolate_moving
@@ -19,7 +19,7 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray, IntArray
 from dynresp.support.errors import MotionError
 
-MOST_FRAMES = 500_000
+MAX_FRAMES = 500_000
 """So many frames are composed at once: an hour at 120 a second takes 432,000. The motion is held in
 memory about eight times over meanwhile (measured), in 2 GB at most."""
 
@@ -38,14 +38,14 @@ class Composition:
         motion: What is played; frame f of the walk is due at f / graph fps.
         jumps: Frames of the walk, from 1, that are reached by a jump.
         placements: (k, 4) where the clip of each frame was put.
-        sliding: (n, 59) the motion before its feet were fitted.
+        unfitted: (n, 59) the motion before its feet were fitted.
     """
 
     frames: IntArray
     motion: Motion
     jumps: npt.NDArray[np.intp]
     placements: FloatArray
-    sliding: FloatArray
+    unfitted: FloatArray
 
 
 def compose(
@@ -69,15 +69,15 @@ def compose(
         max_root_drop: How far the root is lowered at most for legs that are too short [m].
 
     Raises:
-        MotionError: The motion would have more than `MOST_FRAMES` frames.
+        MotionError: The motion would have more than `MAX_FRAMES` frames.
     """
     fps = fps or graph.config.fps
     path = np.asarray(frames, dtype=np.int32)
-    step, part = at_rate(len(path), graph.config.fps, fps)
-    if len(step) > MOST_FRAMES:
+    step, part = steps_at_rate(len(path), graph.config.fps, fps)
+    if len(step) > MAX_FRAMES:
         raise MotionError(
             f"a walk of {len(path) / graph.config.fps:.0f} s at {fps:g} fps has {len(step):,} "
-            f"frames, and at most {MOST_FRAMES:,} are held in memory at once; ask for a shorter "
+            f"frames, and at most {MAX_FRAMES:,} are held in memory at once; ask for a shorter "
             "one or for fewer frames a second"
         )
     playback = Playback(graph, int(path[0]), place)
@@ -88,17 +88,17 @@ def compose(
     knots = np.concatenate([first, played.poses])
     moving = placement.place_velocities(database.velocities[path[:1]], start)
     moving = np.concatenate([moving, played.velocities])
-    contacts = standing(database.contacts[path, :2], step, part)
+    contacts = standing_between(database.contacts[path, :2], step, part)
     poses, source = (np.empty((len(step), POSE_SIZE)) for _ in range(2))
     block = max(1, int(_BLOCK * graph.config.fps / fps))
     for begin in range(0, len(path) - 1, block):
         some = slice(begin, min(begin + block, len(path) - 1))
         rows = slice(*np.searchsorted(step, [some.start, some.stop]))
         steps = recorded_steps(graph, int(path[begin]), played, some)
-        way = Way(step[rows] - begin, part[rows], 1.0 / graph.config.fps, contacts[rows])
+        way = StepTimes(step[rows] - begin, part[rows], 1.0 / graph.config.fps, contacts[rows])
         after = slice(some.start + 1, some.stop + 1)
         ours = KnotSteps(knots[some], knots[after], moving[some], moving[after])
-        poses[rows], source[rows] = (between_knots(character, x, way) for x in (ours, steps))
+        poses[rows], source[rows] = (interpolate_steps(character, x, way) for x in (ours, steps))
     jumps = np.flatnonzero(played.jumps) + 1
     # The first frame of the motion after the frame left.
     entered = np.unique(np.searchsorted(step, jumps - 1))
@@ -112,19 +112,19 @@ def compose(
         motion=Motion(fitted, fps, "walk by graph", contacts),
         jumps=jumps,
         placements=np.concatenate([start[None], played.placements]),
-        sliding=poses,
+        unfitted=poses,
     )
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class StepTimes:
     """Where frames lie among the steps from knot to knot.
 
     Attributes:
-        step: (n,) see `at_rate`.
-        part: (n,) see `at_rate`.
+        step: (n,) see `steps_at_rate`.
+        part: (n,) see `steps_at_rate`.
         seconds: How long a step takes [s].
-        stands: (n, 2) see `standing`.
+        stands: (n, 2) see `standing_between`.
     """
 
     step: npt.NDArray[np.intp]
@@ -133,7 +133,7 @@ class Way:
     stands: BoolArray
 
 
-def between_knots(character: Character, steps: KnotSteps, way: Way) -> FloatArray:
+def interpolate_steps(character: Character, steps: KnotSteps, way: StepTimes) -> FloatArray:
     """Poses (n, 59) among knots, whose feet do not leave them where they stand."""
     at = way.step
     poses = interpolate_moving(
@@ -141,10 +141,12 @@ def between_knots(character: Character, steps: KnotSteps, way: Way) -> FloatArra
         way.seconds,
     )  # fmt: skip
     ends = steps.starts, steps.ends
-    return stand_between(character, poses, ends, at, way.part, way.stands)
+    return keep_feet_planted(character, poses, ends, at, way.part, way.stands)
 
 
-def standing(contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray) -> BoolArray:
+def standing_between(
+    contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray
+) -> BoolArray:
     """Which feet stand in frames among knots: between two knots those that stand at both.
 
     A foot that comes down, or is lifted, moves fast until the knot at which it stands, or from it
@@ -152,8 +154,8 @@ def standing(contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray) 
 
     Args:
         contacts: (k, 2) at the knots.
-        step: (n,) see `at_rate`.
-        part: (n,) see `at_rate`.
+        step: (n,) see `steps_at_rate`.
+        part: (n,) see `steps_at_rate`.
 
     Returns:
         (n, 2).
@@ -163,7 +165,7 @@ def standing(contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray) 
     return np.where(there <= 0.0, before, after & (before | (there >= 1.0 - _ON)))
 
 
-def at_rate(count: int, rate: float, fps: float) -> tuple[npt.NDArray[np.intp], FloatArray]:
+def steps_at_rate(count: int, rate: float, fps: float) -> tuple[npt.NDArray[np.intp], FloatArray]:
     """Where the frames of a motion at another rate lie among knots.
 
     Args:

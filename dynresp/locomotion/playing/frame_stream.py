@@ -8,7 +8,7 @@ import numpy.typing as npt
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
-from dynresp.locomotion.playing.composition import Way, between_knots, standing
+from dynresp.locomotion.playing.composition import StepTimes, interpolate_steps, standing_between
 from dynresp.motion.character import Character
 from dynresp.motion.feet.foot_fitting import ComposedMotion, fit_feet, look_ahead_frames
 from dynresp.motion.motion import pose_velocities
@@ -26,7 +26,7 @@ class Stream:
     Attributes:
         graph: Whose frames.
         frame: The frame of the graph played last.
-        place: (4,) where its clip is put.
+        placement: (4,) where its clip is put.
         end: One past the last frame of the clock for which there is a pose.
     """
 
@@ -78,7 +78,7 @@ class Stream:
         self._at = float(self.end - 1)
         self._pose, self._moving = self._poses[-1], np.array(velocity)
         recorded = graph.database.poses[frame : frame + 1]
-        self._recorded = placement.place_poses(recorded, self._playback.place)[0]
+        self._recorded = placement.place_poses(recorded, self._playback.placement)[0]
         self._touching = self._contacts[-1]
         # Frames of the graph and when they are due, from which the way may be changed.
         self._marks: list[tuple[int, int]] = []
@@ -89,9 +89,9 @@ class Stream:
         return self._playback.frame
 
     @property
-    def place(self) -> FloatArray:
+    def placement(self) -> FloatArray:
         """See the class."""
-        return self._playback.place.copy()
+        return self._playback.placement.copy()
 
     def standing(self, now: int) -> BoolArray | None:
         """(2,) which feet are to stand at a frame of the clock; None where no graph is played."""
@@ -117,10 +117,10 @@ class Stream:
         step = np.ceil((clock - at[0]) / ratio - 1e-9).astype(np.intp) - 1
         step = np.clip(step, 0, count - 1)
         part = np.clip((clock - at[step]) / ratio, 0.0, 1.0)
-        way = Way(step, part, 1.0 / database.fps, standing(touching, step, part))
+        way = StepTimes(step, part, 1.0 / database.fps, standing_between(touching, step, part))
         ours = KnotSteps(knots[:-1], knots[1:], moving[:-1], moving[1:])
         theirs = KnotSteps(starts, ends, steps.moving_starts, steps.moving_ends)
-        poses, source = (between_knots(self._character, x, way) for x in (ours, theirs))
+        poses, source = (interpolate_steps(self._character, x, way) for x in (ours, theirs))
         self._poses = np.concatenate([self._poses, poses])
         self._source = np.concatenate([self._source, source])
         self._contacts = np.concatenate([self._contacts, way.stands])

@@ -61,7 +61,7 @@ class Gait:
         return 60.0 / float(np.median(self.times)) if len(self.times) else float("nan")
 
 
-def gait_of(motion: Motion, character: Character) -> Gait:
+def measure_gait(motion: Motion, character: Character) -> Gait:
     """Measure how a motion walks on level ground.
 
     Args:

@@ -28,7 +28,7 @@ _ALIKE = 1e-3
 _BLOCK = 8192
 
 
-def stand_between(
+def keep_feet_planted(
     character: Character,
     poses: FloatArray,
     knots: tuple[FloatArray, FloatArray],

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import check_in_component
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.footprints import body_arrays, footprints
 from dynresp.locomotion.worlds.paths import window_m
@@ -90,8 +90,8 @@ class Found:
         placements: (k, 4) of their clips.
         joints: (j,) ascending indices into frames, the last frame of each of its ways.
         progress: (j,) how much of the path is done there [points].
-        displacements: (j, 91) what is left of blends there; see `State`. Zeros where there are no
-            boxes.
+        displacements: (j, 91) what is left of blends there; see `AvatarState`. Zeros where there
+            are no boxes.
         arrived: Whether its last frame is where the search was to end; otherwise it comes as near
             as any that was looked at.
         looked: Ways that were taken from the heap.
@@ -145,7 +145,7 @@ class SearchGraph:
 
     def search(
         self,
-        start: State,
+        start: AvatarState,
         path: FloatArray,
         facing: FloatArray,
         spacing: float,
@@ -212,7 +212,7 @@ class SearchGraph:
 
     def _found(
         self,
-        start: State,
+        start: AvatarState,
         chain: npt.NDArray[np.int64],
         done: FloatArray,
         displacements: FloatArray,

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.random_walk import check_in_component
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.sketch.path_search import Found, SearchConfig, SearchGraph
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
@@ -137,7 +137,7 @@ class _Joint:
         played: How many frames of the walk.
     """
 
-    state: State
+    state: AvatarState
     progress: float
     played: int
 
@@ -153,7 +153,7 @@ class Follower:
     def __init__(
         self,
         graph: SearchGraph,
-        start: State,
+        start: AvatarState,
         world: World | None,
         config: SketchConfig | None,
         progress: Progress | None,
@@ -329,7 +329,7 @@ class Follower:
         for joint, progress, left in zip(
             found.joints[:ways], found.progress, found.displacements, strict=False
         ):
-            state = State(int(found.frames[joint]), found.placements[joint], left)
+            state = AvatarState(int(found.frames[joint]), found.placements[joint], left)
             self.joints.append(_Joint(state, float(progress), at.played + int(joint) + 1))
         stop = self.joints[-1].played - at.played
         self.frames = np.concatenate([self.frames[: at.played], found.frames[:stop]])

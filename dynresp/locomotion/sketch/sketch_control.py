@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.path_walk import SPACING, Follower, SketchConfig, SketchedWalk
 from dynresp.locomotion.worlds.obstacles import World
@@ -18,7 +18,7 @@ from dynresp.support.progress import Progress
 
 def follow_sketch(
     graph: SearchGraph,
-    start: State,
+    start: AvatarState,
     sketch: npt.ArrayLike,
     world: World | None = None,
     config: SketchConfig | None = None,
@@ -62,7 +62,7 @@ def follow_sketch(
 
 def reach(
     graph: SearchGraph,
-    start: State,
+    start: AvatarState,
     goal: npt.ArrayLike,
     world: World | None = None,
     config: SketchConfig | None = None,
@@ -97,7 +97,7 @@ def reach(
 
 
 def _check_kinds(
-    graph: SearchGraph, start: State, world: World | None, config: SketchConfig | None
+    graph: SearchGraph, start: AvatarState, world: World | None, config: SketchConfig | None
 ) -> None:
     """Refuse what is something else.
 
@@ -106,7 +106,12 @@ def _check_kinds(
     """
     expected = (
         (graph, SearchGraph, "the graph", "a SearchGraph, made by SearchGraph(graph)"),
-        (start, State, "the start", "a State, as made by State.at(graph, frame, x, y, yaw)"),
+        (
+            start,
+            AvatarState,
+            "the start",
+            "an AvatarState, made by AvatarState.at(...)",
+        ),
         (world, World | None, "the world", "a World of boxes, or None"),
         (config, SketchConfig | None, "the configuration", "a SketchConfig, or None"),
     )

@@ -19,7 +19,12 @@ import numpy.typing as npt
 
 from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.composition import Composition, at_rate, compose, standing
+from dynresp.locomotion.playing.composition import (
+    Composition,
+    compose,
+    standing_between,
+    steps_at_rate,
+)
 from dynresp.locomotion.worlds.playground import Playground, recorded_playground
 from dynresp.locomotion.worlds.world_contacts import PALM, palms
 from dynresp.motion import rotations
@@ -139,7 +144,7 @@ def compose_on_playground(
     held = find_holds(graph, character, played, playground, config)
     poses = _hold_on(character, motion, held, config)
     fitted = Motion(poses, motion.fps, "walk through a playground", motion.contacts)
-    return Composition(played.frames, fitted, played.jumps, played.placements, played.sliding)
+    return Composition(played.frames, fitted, played.jumps, played.placements, played.unfitted)
 
 
 def find_holds(
@@ -174,8 +179,8 @@ def find_holds(
     config = config or HandFitConfig()
     playground = playground or recorded_playground()
     path, fps = played.frames, played.motion.fps
-    step, part = at_rate(len(path), rate, fps)
-    contacts = standing(database.contacts[path, 2:4], step, part)
+    step, part = steps_at_rate(len(path), rate, fps)
+    contacts = standing_between(database.contacts[path, 2:4], step, part)
     near = np.where(part < 0.5, step, step + 1)
     states = character.kinematics(database.poses[path])
     middles = palms(character, states)

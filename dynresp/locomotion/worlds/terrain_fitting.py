@@ -104,7 +104,7 @@ def compose_on_terrain(
         config: How they are put on the blocks.
 
     Returns:
-        As `compose`; `motion` is fitted to the blocks. `sliding` is at the heights that were
+        As `compose`; `motion` is fitted to the blocks. `unfitted` is at the heights that were
         recorded, which are not those of the blocks where the walk changes steps.
     """
     config = config or TerrainFitConfig()
@@ -116,7 +116,7 @@ def compose_on_terrain(
     blocks = walk_blocks(walk, rate, motion)
     poses = _put_on_blocks(character, terrain, motion, blocks, config)
     fitted = Motion(poses, motion.fps, "walk over blocks", motion.contacts)
-    return Composition(played.frames, fitted, played.jumps, walk.placements, played.sliding)
+    return Composition(played.frames, fitted, played.jumps, walk.placements, played.unfitted)
 
 
 def walk_blocks(walk: TerrainWalk, rate: float, motion: Motion) -> LongArray:

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.random_walk import check_in_component
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled, window_m
 from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.locomotion.worlds.terrain import Terrain
@@ -138,7 +138,7 @@ def start_on_terrain(
     at: npt.ArrayLike,
     toward: npt.ArrayLike,
     config: TerrainWalkConfig | None = None,
-) -> State:
+) -> AvatarState:
     """A state to begin from: standing near a place, facing another, and with a way on.
 
     Args:
@@ -170,7 +170,7 @@ def start_on_terrain(
         frame = int(frames[row])
         place = graph.standing(terrain, frame, cells[turns][row], turns)
         if place is not None:
-            state = State(frame, graph.meters(terrain, place))
+            state = AvatarState(frame, graph.meters(terrain, place))
             found = _search(graph, terrain, state, goal[None], small)
             if found.arrived or len(found.frames) > _ON_S * graph.graph.database.fps:
                 return state
@@ -184,7 +184,7 @@ def start_on_terrain(
 def reach_on_terrain(
     graph: TerrainGraph,
     terrain: Terrain,
-    start: State,
+    start: AvatarState,
     goal: npt.ArrayLike,
     config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
@@ -212,7 +212,7 @@ def reach_on_terrain(
 def follow_on_terrain(
     graph: TerrainGraph,
     terrain: Terrain,
-    start: State,
+    start: AvatarState,
     sketch: npt.ArrayLike,
     config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
@@ -241,7 +241,7 @@ def follow_on_terrain(
 def wander_on_terrain(
     graph: TerrainGraph,
     terrain: Terrain,
-    start: State,
+    start: AvatarState,
     frames: int,
     rng: np.random.Generator,
     config: TerrainWalkConfig | None = None,
@@ -275,7 +275,7 @@ def wander_on_terrain(
     while played < frames:
         at = start
         if stretches:
-            at = State(int(stretches[-1].frames[-1]), stretches[-1].placements[-1])
+            at = AvatarState(int(stretches[-1].frames[-1]), stretches[-1].placements[-1])
         goal = _place_at_random(terrain, at.root(graph.graph)[:2], rng)
         found = reach_on_terrain(graph, terrain, at, goal, config)
         looked += found.looked
@@ -308,7 +308,11 @@ def _place_at_random(terrain: Terrain, here: FloatArray, rng: np.random.Generato
 
 
 def _search(
-    graph: TerrainGraph, terrain: Terrain, start: State, path: FloatArray, config: TerrainWalkConfig
+    graph: TerrainGraph,
+    terrain: Terrain,
+    start: AvatarState,
+    path: FloatArray,
+    config: TerrainWalkConfig,
 ) -> TerrainWalk:
     from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
 
@@ -330,7 +334,7 @@ def _search(
 
 
 def _begin(
-    graph: TerrainGraph, terrain: Terrain, start: State, config: TerrainWalkConfig
+    graph: TerrainGraph, terrain: Terrain, start: AvatarState, config: TerrainWalkConfig
 ) -> tuple[LongArray, tuple[npt.NDArray, ...], FloatArray]:  # type: ignore[type-arg]
     """The place, the feet and the settings with which a kernel begins."""
     from dynresp.locomotion.worlds import terrain_walk_kernel as kernel

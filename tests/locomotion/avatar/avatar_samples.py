@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dynresp.locomotion.avatar.avatar import Doing, Wanderer
+from dynresp.locomotion.avatar.avatar import Activity, RandomPlanner
 from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import ROOT, Character
@@ -27,16 +27,16 @@ class Watched:
             (int(rng.choice(graph.frames)), np.array([1.0, 2.0, 0.0, rng.uniform(-3.0, 3.0)]))
             for rng in generators
         ]
-        planners = [Wanderer(graph, rng) for rng in generators]
+        planners = [RandomPlanner(graph, rng) for rng in generators]
         self.crowd = AvatarCrowd(character, library, graph, planners, starts, threads=threads)
         self.avatars = self.crowd.avatars
         self._shown = [np.stack([avatar.responder.pose for avatar in self.avatars])]
-        self._doing = [[avatar.doing for avatar in self.avatars]]
+        self._doing = [[avatar.activity for avatar in self.avatars]]
 
     def go_on(self, frames: int) -> None:
         for _ in range(frames):
             self._shown.append(self.crowd.advance())
-            self._doing.append([avatar.doing for avatar in self.avatars])
+            self._doing.append([avatar.activity for avatar in self.avatars])
 
     def until(self, phase: Phase, most: int = 120) -> None:
         for _ in range(most):
@@ -48,7 +48,7 @@ class Watched:
     def shown(self, i: int = 0) -> FloatArray:
         return np.stack([poses[i] for poses in self._shown])
 
-    def doing(self, i: int = 0) -> list[Doing]:
+    def doing(self, i: int = 0) -> list[Activity]:
         return [now[i] for now in self._doing]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Doing
+from dynresp.locomotion.avatar.avatar import Activity, Avatar, AvatarConfig
 from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -36,7 +36,7 @@ class Straight:
         self.graph = graph
         self.asked: list[int] = []
 
-    def way(self, frame: int, place: FloatArray, count: int) -> npt.NDArray[np.int32]:
+    def next_frames(self, frame: int, place: FloatArray, count: int) -> npt.NDArray[np.int32]:
         self.asked.append(frame)
         path = []
         for _ in range(count):
@@ -72,7 +72,7 @@ def _turns(poses: FloatArray) -> FloatArray:
 def _returned(avatar: Avatar) -> int:
     """The frame at which the last reaction was left."""
     last = avatar.returns[-1]
-    assert last.way is not None
+    assert last.entry is not None
     assert last.moment is not None
     return last.moment
 
@@ -84,7 +84,7 @@ def test_it_walks_on_and_on_as_recorded(one: Watched, graph: MotionGraph) -> Non
     assert root_steps(shown).max() < 1.1 * fastest
     assert root_steps(shown).mean() > 0.5 * np.median(root_steps(shown)) > 0.005
     assert np.isfinite(shown).all()
-    assert set(one.doing()) == {Doing.WALKING}
+    assert set(one.activity()) == {Activity.WALKING}
     # Arms and trunk are not touched by fitting feet: outside of blends they are as recorded.
     recorded = graph.database.poses[:, UPPER]
     apart = [np.abs(recorded - pose[UPPER]).max(axis=1).min() for pose in shown[::2]]
@@ -130,9 +130,9 @@ def test_after_a_hit_it_walks_by_graph_again(
     avatar.responder.hit(impact)
     one.until(Phase.PHYSICS)
     one.go_on(1)
-    assert avatar.doing is Doing.HIT
+    assert avatar.activity is Activity.HIT
     one.until(Phase.PLAYING)
-    assert avatar.doing is Doing.WALKING
+    assert avatar.activity is Activity.WALKING
     one.go_on(150)
     assert len(avatar.returns) == 1
     moment = _returned(avatar)
@@ -170,10 +170,10 @@ def test_a_light_hit_is_carried_on_through_and_the_way_goes_on(
     one.avatars[0].responder.hit(Ball(0.5, **FLUFF))
     one.go_on(200)
     (back,) = one.avatars[0].returns
-    assert back.after == "carry_on"
-    assert back.way is not None
+    assert back.reaction == "carry_on"
+    assert back.entry is not None
     # It resembles itself.
-    assert back.way.distance < 0.1
+    assert back.entry.distance < 0.1
     assert root_steps(one.shown()).max() < 0.06
 
 
@@ -188,7 +188,7 @@ def test_a_second_hit_at_any_time_is_survived(one: Watched, phase: Phase, second
         one.until(phase)
         avatar.responder.hit(second)
     one.go_on(240)
-    assert avatar.doing is Doing.WALKING
+    assert avatar.activity is Activity.WALKING
     assert _returned(avatar) < avatar.responder.frame
     assert root_steps(one.shown()).max() < 0.17
     assert root_steps(one.shown()[-60:]).max() > 0.005
@@ -238,7 +238,7 @@ def test_who_is_steered_while_hit_goes_there_after_the_return(
     avatar.steer(planner)
     assert not planner.asked
     one.until(Phase.PLAYING)
-    back = avatar.returns[-1].way
+    back = avatar.returns[-1].entry
     assert back is not None
     # First what was recorded there goes on, for as long as the reaction is blended away.
     blend = round(graph.config.blend_s * graph.database.fps)
@@ -264,12 +264,12 @@ def test_who_falls_stays_down_and_can_be_hit_there(
     (avatar,) = one.avatars
     avatar.responder.hit(HARD)
     one.go_on(150)
-    assert avatar.doing is Doing.STAYING
-    assert avatar.returns[-1].way is None
+    assert avatar.activity is Activity.STAYING
+    assert avatar.returns[-1].entry is None
     assert avatar.responder.pose[2] < 0.3
     avatar.responder.hit(Push(0.1, 400.0, 0.2, target="pelvis"))
     one.go_on(100)
-    assert avatar.doing is Doing.STAYING
+    assert avatar.activity is Activity.STAYING
     assert len(avatar.returns) == 2
     assert np.isfinite(one.shown()).all()
 
@@ -285,13 +285,13 @@ def test_who_falls_gets_up_by_a_recording_and_walks_on(
     (avatar,) = one.avatars
     avatar.responder.hit(HARD)
     one.go_on(60)
-    back = avatar.returns[-1].way
+    back = avatar.returns[-1].entry
     assert back is not None
     assert len(back.detour) > 5
     one.go_on(200)
     assert one.shown()[:, 2].min() < 0.4
     assert avatar.responder.pose[2] > 0.8
-    assert avatar.doing is Doing.WALKING
+    assert avatar.activity is Activity.WALKING
     assert root_steps(one.shown()).max() < 0.1
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.locomotion.avatar.avatar import Doing
+from dynresp.locomotion.avatar.avatar import Activity
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
@@ -41,7 +41,7 @@ def _hit_again_and_again(crowd: Watched, rng: np.random.Generator, hits: int, re
     done, frame = 0, 0
     while done < hits:
         for i, avatar in enumerate(crowd.avatars):
-            if frame >= due[i] and avatar.doing is not Doing.HIT:
+            if frame >= due[i] and avatar.activity is not Activity.HIT:
                 avatar.responder.hit(_random_impact(rng))
                 due[i] = frame + rng.integers(60, 150)
                 done += 1
@@ -60,23 +60,23 @@ def _check_all_came_back(
     usual = max(np.quantile(walked, 0.999), np.quantile(np.concatenate(reacted), 0.999))
     outcomes: Counter[str] = Counter()
     for i, avatar in enumerate(crowd.avatars):
-        shown, doing = crowd.shown(i), crowd.doing(i)
+        shown, doing = crowd.shown(i), crowd.activity(i)
         assert np.isfinite(shown).all()
         steps = root_steps(shown)
         print("STEPS", steps.max(), usual, np.diff(steps).max())
-        hit = np.array([what is Doing.HIT for what in doing])
+        hit = np.array([what is Activity.HIT for what in doing])
         free = ~(hit[1:] | hit[:-1])
         for back in avatar.returns:
             if back.moment is None:
                 outcomes["stays"] += 1
                 continue
-            outcomes["carried on" if back.after == "carry_on" else "reacted"] += 1
-            assert (back.moment - back.laid) / FPS < within_s
+            outcomes["carried on" if back.reaction == "carry_on" else "reacted"] += 1
+            assert (back.moment - back.decided) / FPS < within_s
             window = slice(back.moment, back.moment + 30)
             assert steps[window][free[window]].max(initial=0.0) < usual + 0.03
         # By the end all are what they are to be: walking, or down where a reaction has ended so.
-        assert doing[-1] in (Doing.WALKING, Doing.STAYING)
-        if doing[-1] is Doing.STAYING:
+        assert doing[-1] in (Activity.WALKING, Activity.STAYING)
+        if doing[-1] is Activity.STAYING:
             assert avatar.returns[-1].moment is None
         else:
             print("WALKED", np.linalg.norm(np.diff(shown[-90:, :2], axis=0), axis=1).sum())
@@ -96,9 +96,9 @@ def test_hundreds_of_hits_on_built_in_walkers(character: Character) -> None:
     # The built-in fall to the side ends lying; nobody stays in any other way.
     assert outcomes["stays"] > 0
     for avatar in crowd.avatars:
-        falls = [back.after for back in avatar.returns if back.moment is None]
+        falls = [back.reaction for back in avatar.returns if back.moment is None]
         assert all(name.startswith("side_fall") or name == "carry_on" for name in falls)
-        assert (avatar.responder.pose[2] < 0.4) == (avatar.doing is Doing.STAYING)
+        assert (avatar.responder.pose[2] < 0.4) == (avatar.activity is Activity.STAYING)
 
 
 @pytest.mark.slow

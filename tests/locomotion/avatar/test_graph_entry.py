@@ -25,7 +25,7 @@ Moments = tuple[FloatArray, FloatArray, FloatArray]
 
 def _graph(rng: np.random.Generator, coordinates: Coordinates) -> MotionGraph:
     config = GraphConfig(coordinates=coordinates, contact_change=False, sigma=1.0)
-    return MotionGraph.of(made_database(rng, (60, 50, 40)), config)
+    return MotionGraph.from_database(made_database(rng, (60, 50, 40)), config)
 
 
 def _moments(rng: np.random.Generator, graph: MotionGraph, count: int = 7) -> Moments:
@@ -41,23 +41,23 @@ def _moments(rng: np.random.Generator, graph: MotionGraph, count: int = 7) -> Mo
 
 
 @pytest.mark.parametrize("coordinates", list(Coordinates))
-@pytest.mark.parametrize("farthest", [np.inf, 0.4])
+@pytest.mark.parametrize("max_distance", [np.inf, 0.4])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_nearest_frames_are_those_of_the_slow_twin(
-    character: Character, coordinates: Coordinates, farthest: float, seed: int
+    character: Character, coordinates: Coordinates, max_distance: float, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
     graph = _graph(rng, coordinates)
     index = EntryIndex(graph)
     poses, velocities, contacts = _moments(rng, graph)
-    found = index.nearest(poses, velocities, contacts, farthest)
+    found = index.nearest(poses, velocities, contacts, max_distance)
     for row in range(len(poses)):
         expected = oracle.nearest(
             graph, character.joint_names, index.frames.tolist(),
-            poses[row], velocities[row], contacts[row], farthest,
+            poses[row], velocities[row], contacts[row], max_distance,
         )  # fmt: skip
-        if expected.distance > farthest:
-            assert found.distances[row] > farthest
+        if expected.distance > max_distance:
+            assert found.distances[row] > max_distance
             continue
         assert found.frames[row] == expected.frame
         assert found.distances[row] == pytest.approx(expected.distance, abs=1e-9)
@@ -68,14 +68,14 @@ def test_the_nearest_frames_are_those_of_the_slow_twin(
 def test_moment_and_frame_are_found_together(character: Character, seed: int) -> None:
     rng = np.random.default_rng(seed)
     graph = _graph(rng, Coordinates.RELATIVE)
-    config = ReentryConfig(farthest=0.6, waiting=0.1, apart=0.0)
+    config = ReentryConfig(max_distance=0.6, waiting=0.1, apart=0.0)
     planner = ReentryPlanner(graph, character, config)
     poses, velocities, contacts = _moments(rng, graph)
     times = np.arange(len(poses)) / 5.0
     found = [
         oracle.nearest(
             graph, character.joint_names, planner.entries.frames.tolist(),
-            poses[row], velocities[row], contacts[row], config.farthest,
+            poses[row], velocities[row], contacts[row], config.max_distance,
         )
         for row in range(len(poses))
     ]  # fmt: skip
@@ -102,7 +102,7 @@ def test_feet_count_as_far_as_they_are_apart(character: Character, seed: int) ->
     """Moment and frame are the best of all that were considered, one by one."""
     rng = np.random.default_rng(seed)
     graph = _graph(rng, Coordinates.RELATIVE)
-    config = ReentryConfig(farthest=0.6, waiting=0.1, apart=0.5, candidates=150)
+    config = ReentryConfig(max_distance=0.6, waiting=0.1, apart=0.5, candidates=150)
     planner = ReentryPlanner(graph, character, config)
     poses, velocities, contacts = _moments(rng, graph)
     poses, velocities, contacts = (x[3:] for x in (poses, velocities, contacts))
@@ -185,7 +185,7 @@ def test_a_fall_is_not_left_before_it_is_over(character: Character) -> None:
     way = _find(planner, there_and_back)
     assert way is not None
     assert way.moment > len(down)
-    assert way.distance < planner.config.farthest
+    assert way.distance < planner.config.max_distance
 
 
 @pytest.mark.parametrize("ends", ["where others walk", "in the air"])

@@ -100,7 +100,7 @@ def test_places_are_those_of_playing_along(walking: ClusterForest) -> None:
         way = tree.way_to(node)
         clip = placement.IDENTITY
         for left, entered in itertools.pairwise(way):
-            move = walking.graph.placement_between([left], [entered])[0]
+            move = walking.graph.placements_between([left], [entered])[0]
             clip = placement.compose(clip, move)
         end = placement.compose(clip, walking.graph.database.planar[way[-1]])
         np.testing.assert_allclose(places[node][:3], end[:3], atol=1e-9)

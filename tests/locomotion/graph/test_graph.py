@@ -10,7 +10,7 @@ from dynresp.locomotion.graph import placement, pruning
 from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.frame_distance import JOINT_WEIGHTS
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.motion_graph import MotionGraph, keeps_its_feet
+from dynresp.locomotion.graph.motion_graph import MotionGraph, feet_stay_planted
 from dynresp.locomotion.graph.pruning import Transitions, find_transitions
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
@@ -53,7 +53,7 @@ def check_rows(graph: MotionGraph) -> None:
         assert (np.diff(graph.cumulative[row]) >= 0).all()
         assert graph.cumulative[row][-1] == 1.0
     assert (graph.distances[~jumps] == 0).all()
-    assert (graph.distances[jumps] <= np.float32(graph.config.farthest)).all()
+    assert (graph.distances[jumps] <= np.float32(graph.config.max_distance)).all()
     assert graph.counts.component == np.count_nonzero(jumps)
     assert graph.counts.component_frames == len(graph.frames)
     assert (graph.counts.frames, graph.counts.pairs) == (n, n * n)
@@ -92,7 +92,7 @@ def test_it_is_its_slow_twin(coordinates: Coordinates, contact_change: bool, see
         zip(*(x.tolist() for x in (found.sources, found.targets, found.distances)), strict=True)
     )
     try:
-        graph = MotionGraph.of(database, config)
+        graph = MotionGraph.from_database(database, config)
     except MotionError:
         assert not oracle.graph(database, jumps, config)
         return
@@ -115,9 +115,9 @@ def test_feet_that_would_slip_through_a_blend(
         blend_s=0.5,
     )  # fmt: skip
     found = find_transitions(database, config)
-    kept = keeps_its_feet(database, config, character, found.sources, found.targets)
+    kept = feet_stay_planted(database, config, character, found.sources, found.targets)
     expected = [
-        oracle.keeps_its_feet(database, int(i), int(j), config, character)
+        oracle.feet_stay_planted(database, int(i), int(j), config, character)
         for i, j in zip(found.sources, found.targets, strict=True)
     ]
     np.testing.assert_array_equal(kept, expected)
@@ -147,7 +147,7 @@ def test_the_component_of_any_ways(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(pruning, "find_transitions", lambda *_, found=given_ways: found)
         jumps = [(int(i), int(j), float(d)) for (i, j), d in zip(ways, distances, strict=True)]
         try:
-            graph = MotionGraph.of(database, GraphConfig(**SLIPPING))
+            graph = MotionGraph.from_database(database, GraphConfig(**SLIPPING))
         except MotionError:
             assert not oracle.graph(database, jumps, GraphConfig())
             continue
@@ -159,7 +159,7 @@ def test_the_component_of_any_ways(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_graph_of_motions(character: Character) -> None:
     motions = walking_motions(character)
-    graph = MotionGraph.build(motions, owed_to=("to me",))
+    graph = MotionGraph.build(motions, credit_lines=("to me",))
     check_rows(graph)
     database = graph.database
     assert [clip.name for clip in database.clips] == [motion.name for motion in motions]
@@ -188,7 +188,7 @@ def test_the_order_of_motions_changes_nothing_else(character: Character) -> None
 def test_threads_change_no_bit() -> None:
     database = made_database(np.random.default_rng(9), (300, 2, 250), alike=0.1)
     config = GraphConfig(contact_change=False, sigma=0.4, **SLIPPING)
-    graphs = [MotionGraph.of(database, config, threads=threads) for threads in (1, 2, 5, 0)]
+    graphs = [MotionGraph.from_database(database, config, threads=n) for n in (1, 2, 5, 0)]
     assert graphs[0].counts.component > 100
     for graph in graphs[1:]:
         assert graph.counts == graphs[0].counts
@@ -204,7 +204,7 @@ class TestPlacements:
         """Placements and distances are of one mind on how a frame is laid over another."""
         database = made_database(np.random.default_rng(11), (120, 120, 120), alike=0.1)
         config = GraphConfig(coordinates=coordinates, sigma=0.4, **SLIPPING)
-        graph = MotionGraph.of(database, config)
+        graph = MotionGraph.from_database(database, config)
         fixed = replace(config, coordinates=Coordinates.FIXED)
         jumps = np.flatnonzero(is_jump(graph))
         assert len(jumps) > 10
@@ -235,14 +235,14 @@ class TestPlacements:
     @pytest.mark.parametrize("coordinates", list(Coordinates))
     def test_recorded_ways_move_no_clip(self, coordinates: Coordinates) -> None:
         database = made_database(np.random.default_rng(11), (120, 120, 120), alike=0.1)
-        graph = MotionGraph.of(
+        graph = MotionGraph.from_database(
             database, GraphConfig(coordinates=coordinates, sigma=0.4, **SLIPPING)
         )
         assert (graph.placements[~is_jump(graph)] == 0).all()
 
     def test_fixed_clips_stay(self) -> None:
         database = made_database(np.random.default_rng(11), (120, 120, 120), alike=0.1)
-        graph = MotionGraph.of(
+        graph = MotionGraph.from_database(
             database, GraphConfig(coordinates=Coordinates.FIXED, sigma=0.4, **SLIPPING)
         )
         assert is_jump(graph).any()
@@ -258,7 +258,7 @@ class TestPlacements:
         n = len(database)
         clips = [replace(clip, start=clip.start + n, stop=clip.stop + n) for clip in database.clips]
         contacts = np.tile(database.contacts, (2, 1))
-        graph = MotionGraph.of(
+        graph = MotionGraph.from_database(
             MotionDatabase(poses, contacts, 15.0, (*database.clips, *clips), ""), config
         )
         over = is_jump(graph) & (graph.sources < n) & (graph.targets == graph.sources + n + 1)
@@ -271,9 +271,9 @@ class TestPlacements:
 
     def test_between_any_frames(self, character: Character) -> None:
         graph = walking_graph(character, sigma=0.3)
-        own = graph.placement_between(graph.sources, graph.targets)
+        own = graph.placements_between(graph.sources, graph.targets)
         np.testing.assert_array_equal(own, graph.placements)
-        assert graph.placement_between(graph.sources[:0], graph.targets[:0]).shape == (0, 4)
+        assert graph.placements_between(graph.sources[:0], graph.targets[:0]).shape == (0, 4)
 
 
 def marching(character: Character, seed: int) -> Motion:
@@ -334,12 +334,12 @@ class TestErrors:
     def test_frame_rates_must_agree(self) -> None:
         database = made_database(np.random.default_rng(1), (30, 30))
         with pytest.raises(MotionError, match=r"15 fps and the configuration 30; gather"):
-            MotionGraph.of(database, GraphConfig(fps=30.0))
+            MotionGraph.from_database(database, GraphConfig(fps=30.0))
 
     def test_a_way_must_be_left(self, character: Character) -> None:
         database = made_database(np.random.default_rng(1), (30, 30))
         with pytest.raises(MotionError, match="no frame resembles another enough"):
-            MotionGraph.of(database, GraphConfig(sigma=1e-9))
+            MotionGraph.from_database(database, GraphConfig(sigma=1e-9))
         with pytest.raises(MotionError, match="Give more motion"):
             MotionGraph.build([marching(character, 1).slice(0, 5)], GraphConfig(), character)
 
@@ -359,7 +359,7 @@ class TestErrors:
         poses = np.array(database.poses)
         poses[3, 9] = np.nan
         with pytest.raises(MotionError, match="not finite"):
-            MotionGraph.of(replace(database, poses=poses), GraphConfig())
+            MotionGraph.from_database(replace(database, poses=poses), GraphConfig())
 
     def test_mirrors_have_no_fixed_place(self) -> None:
         with pytest.raises(UsageError, match="mirrored world"):

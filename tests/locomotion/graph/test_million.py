@@ -91,7 +91,7 @@ def test_feet_are_fitted_and_stand(walk: Walk, character: Character) -> None:
         assert np.isfinite(made.motion.poses).all()
         jumped.append(at_jumps(made.motion, made.jumps))
         slides += foot_skates(made.motion, character)
-        played = Motion(made.sliding, graph.config.fps, "", made.motion.contacts)
+        played = Motion(made.unfitted, graph.config.fps, "", made.motion.contacts)
         before += foot_skates(played, character)
     assert np.mean(np.array(before) < 0.01) < 0.1
     assert np.mean(np.array(slides) < 0.01) > 0.99

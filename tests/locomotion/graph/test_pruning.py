@@ -21,8 +21,8 @@ def between_distances(distances, config, share):
     levels = np.unique(distances[np.triu_indices(len(distances), 1)])
     at = int(share * (len(levels) - 2))
     gap = int(np.argmax(np.diff(levels[at : at + 10])))
-    farthest = 0.5 * (levels[at + gap] + levels[at + gap + 1])
-    return replace(config, sigma=farthest / -np.log(config.least_probability))
+    max_distance = 0.5 * (levels[at + gap] + levels[at + gap + 1])
+    return replace(config, sigma=max_distance / -np.log(config.least_probability))
 
 
 @pytest.mark.parametrize("coordinates", list(Coordinates))

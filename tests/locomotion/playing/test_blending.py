@@ -48,7 +48,7 @@ def test_any_pose_and_velocity_are_met_where_a_blend_begins(
     playback = Playback.entering(graph, frame, pose, velocity)
     assert playback.displacement.shape == (91,)
     offset, rate, age = np.split(playback.displacement, [45, 90])
-    x, y, z, yaw = playback.place
+    x, y, z, yaw = playback.placement
     turn, shift = Rotation.from_euler("z", yaw), np.array([x, y, z])
     shown = oracle.displaced(recorded, turn, shift, offset)
     apart = differences(shown[None], pose[None])

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import place_poses
 from dynresp.locomotion.graph.random_walk import random_walk
-from dynresp.locomotion.playing.composition import Composition, at_rate, compose
+from dynresp.locomotion.playing.composition import Composition, compose, steps_at_rate
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.feet.skating import foot_skates
 from dynresp.motion.motion import Motion
@@ -57,13 +57,13 @@ def test_frames_outside_blends_are_met_exactly(
 ) -> None:
     made = compose(graph, character, walk, fps=fps)
     assert made.motion.fps == fps
-    assert len(made.motion) == len(made.sliding) == round((len(walk) - 1) * fps / 15.0) + 1
+    assert len(made.motion) == len(made.unfitted) == round((len(walk) - 1) * fps / 15.0) + 1
     np.testing.assert_array_equal(made.frames, walk)
     placed = place_poses(graph.database.poses[walk], made.placements)
     step = round(fps / 15.0)
     calm = ~blended(made)
     assert 50 < calm.sum() < len(walk) - 50
-    shift, turn = differences(made.sliding[::step][calm], placed[calm])
+    shift, turn = differences(made.unfitted[::step][calm], placed[calm])
     assert shift < 1e-9
     assert turn < 1e-6
     np.testing.assert_array_equal(made.motion.contacts[::step], graph.database.contacts[walk])
@@ -76,7 +76,7 @@ def test_in_blends_they_are_met_in_the_end(
     """What is played between is on its way: never farther off than where the jump began."""
     made = compose(graph, character, walk, fps=fps)
     placed = place_poses(graph.database.poses[walk], made.placements)
-    shift, turn = differences(made.sliding[:: round(fps / 15.0)], placed)
+    shift, turn = differences(made.unfitted[:: round(fps / 15.0)], placed)
     assert 1e-3 < shift < 0.5
     assert 1e-2 < turn < 1.5
 
@@ -99,7 +99,7 @@ def test_a_walk_of_no_jumps_is_the_recording(
     made = compose(graph, character, np.arange(clip.start, clip.stop), fps=fps)
     recorded = graph.database.motion(1)
     assert len(made.jumps) == 0
-    shift, turn = differences(made.sliding[:: round(fps / 15.0)], recorded.poses)
+    shift, turn = differences(made.unfitted[:: round(fps / 15.0)], recorded.poses)
     assert shift < 1e-9
     assert turn < 1e-6
     # Between the graph's frames it is nearer to the recording than slerp, and does not jerk. Told
@@ -114,7 +114,7 @@ def test_a_walk_of_no_jumps_is_the_recording(
         )
         assert ours[0] < 0.5 * theirs[0]
         assert ours[1] < theirs[1]
-        steps = joint_speed_steps(Motion(made.sliding, fps))
+        steps = joint_speed_steps(Motion(made.unfitted, fps))
         assert np.percentile(steps, 99) < 1.2 * np.percentile(joint_speed_steps(whole), 99)
 
 
@@ -124,7 +124,7 @@ def test_hardly_anything_is_fitted_where_feet_do_not_slide(
 ) -> None:
     clip = graph.database.clips[1]
     made = compose(graph, character, np.arange(clip.start, clip.stop), fps=fps)
-    shift, turn = differences(made.motion.poses, made.sliding)
+    shift, turn = differences(made.motion.poses, made.unfitted)
     assert shift < 1e-3
     assert turn < np.radians(2.0)
 
@@ -134,17 +134,17 @@ def test_nothing_is_broken_and_standing_feet_stay(
     graph: MotionGraph, walk: np.ndarray, character: Character, fps: float
 ) -> None:
     made = compose(graph, character, walk, fps=fps)
-    for poses in (made.motion.poses, made.sliding):
+    for poses in (made.motion.poses, made.unfitted):
         assert np.isfinite(poses).all()
         norms = np.linalg.norm(poses[:, 3:].reshape(-1, 14, 4), axis=-1)
         np.testing.assert_allclose(norms, 1.0, atol=1e-9)
-    sliding = foot_skates(Motion(made.sliding, fps, "sliding", made.motion.contacts), character)
+    sliding = foot_skates(Motion(made.unfitted, fps, "sliding", made.motion.contacts), character)
     fitted = foot_skates(made.motion, character)
     assert len(fitted) == len(sliding) > 60
     assert np.percentile(sliding, 90) > 0.02
     assert np.percentile(fitted, 99) < 0.01
     # What is fitted stays near what is played.
-    shift, _ = differences(made.motion.poses, made.sliding)
+    shift, _ = differences(made.motion.poses, made.unfitted)
     assert shift < 0.1
 
 
@@ -155,7 +155,7 @@ def test_it_begins_where_it_is_told_to(
     here = compose(graph, character, walk[:100], fps=30.0)
     there = compose(graph, character, walk[:100], place, fps=30.0)
     np.testing.assert_array_equal(there.placements[0], place)
-    for a, b in ((here.sliding, there.sliding), (here.motion.poses, there.motion.poses)):
+    for a, b in ((here.unfitted, there.unfitted), (here.motion.poses, there.motion.poses)):
         shift, turn = differences(place_poses(a, place), b)
         assert shift < 1e-6
         assert turn < 1e-5
@@ -166,7 +166,7 @@ def test_it_ends_before_frames_that_are_not_walked_yet(
 ) -> None:
     long = compose(graph, character, walk[:80], fps=30.0)
     short = compose(graph, character, walk[:50], fps=30.0)
-    np.testing.assert_allclose(long.sliding[: len(short.sliding)], short.sliding, atol=1e-12)
+    np.testing.assert_allclose(long.unfitted[: len(short.unfitted)], short.unfitted, atol=1e-12)
 
 
 @given(
@@ -175,7 +175,7 @@ def test_it_ends_before_frames_that_are_not_walked_yet(
     fps=st.sampled_from([7.0, 15.0, 24.0, 30.0, 59.94, 120.0]),
 )
 def test_frames_at_another_rate(count: int, rate: float, fps: float) -> None:
-    step, part = at_rate(count, rate, fps)
+    step, part = steps_at_rate(count, rate, fps)
     np.testing.assert_allclose((step + part) / rate, np.arange(len(step)) / fps, atol=1e-7)
     assert step.min() == 0
     assert step.max() <= count - 2

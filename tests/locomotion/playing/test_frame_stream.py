@@ -59,7 +59,7 @@ def test_a_clock_slower_than_the_graph_is_refused(graph: MotionGraph, character:
 def test_a_walk_that_no_memory_holds_is_refused(
     graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(composing, "MOST_FRAMES", 100)
+    monkeypatch.setattr(composing, "MAX_FRAMES", 100)
     walk = random_walk(graph, 60, np.random.default_rng(2))
     with pytest.raises(MotionError, match=r"4 s at 30 fps has 119 frames.*at most 100"):
         compose(graph, character, walk, fps=30.0)

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.locomotion.playing.gait_measures import gait_of, ground_speeds
+from dynresp.locomotion.playing.gait_measures import ground_speeds, measure_gait
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.feet import legs
@@ -46,7 +46,7 @@ def made_walk(character: Character, steps: int = 12, backward: bool = False) -> 
 
 @pytest.mark.parametrize("backward", [False, True])
 def test_steps_of_a_made_walk(character: Character, backward: bool) -> None:
-    gait = gait_of(made_walk(character, backward=backward), character)
+    gait = measure_gait(made_walk(character, backward=backward), character)
     assert len(gait.lengths) >= 9
     np.testing.assert_allclose(gait.lengths, STEP_M, atol=0.01)
     np.testing.assert_allclose(gait.widths, APART_M, atol=0.01)
@@ -58,7 +58,10 @@ def test_steps_of_a_made_walk(character: Character, backward: bool) -> None:
 
 def test_a_turned_walk_has_the_same_steps(character: Character) -> None:
     walk = made_walk(character)
-    gait, turned = gait_of(walk, character), gait_of(walk.moved(2.0, (1.0, -3.0, 0.0)), character)
+    gait, turned = (
+        measure_gait(walk, character),
+        measure_gait(walk.moved(2.0, (1.0, -3.0, 0.0)), character),
+    )
     for name in ("lengths", "widths", "times", "begins_s", "feet"):
         np.testing.assert_allclose(getattr(turned, name), getattr(gait, name), atol=1e-9)
     np.testing.assert_allclose(turned.yaws, gait.yaws + 2.0, atol=1e-9)
@@ -66,7 +69,10 @@ def test_a_turned_walk_has_the_same_steps(character: Character) -> None:
 
 def test_a_mirrored_walk_has_the_same_steps(character: Character) -> None:
     walk = load_builtin("walk", character).resampled(FPS).slice(60, 300)
-    gait, mirrored = gait_of(walk, character), gait_of(walk.mirrored(character), character)
+    gait, mirrored = (
+        measure_gait(walk, character),
+        measure_gait(walk.mirrored(character), character),
+    )
     assert len(gait.lengths) > 8
     np.testing.assert_allclose(mirrored.lengths, gait.lengths, atol=1e-3)
     np.testing.assert_allclose(mirrored.widths, gait.widths, atol=1e-3)
@@ -75,7 +81,7 @@ def test_a_mirrored_walk_has_the_same_steps(character: Character) -> None:
 
 def test_standing_makes_no_step(character: Character) -> None:
     still = Motion(np.repeat(character.rest_pose[None], 60, axis=0), FPS, "still")
-    gait = gait_of(still, character)
+    gait = measure_gait(still, character)
     assert len(gait.feet) == len(FEET)
     assert len(gait.lengths) == len(gait.widths) == len(gait.times) == 0
     assert np.isnan(gait.cadence)
@@ -100,7 +106,7 @@ def test_a_speed_needs_two_frames_and_a_time(character: Character) -> None:
 @pytest.mark.mocap
 def test_steps_of_a_recorded_walk(character: Character, motions_folder: Path) -> None:
     walk = load_motion(motions_folder / "cmu/16/16_32.amc").resampled(FPS)
-    gait = gait_of(walk, character)
+    gait = measure_gait(walk, character)
     assert len(gait.lengths) >= 6
     assert 0.6 < np.median(gait.lengths) < 0.8
     assert 0.03 < np.median(gait.widths) < 0.2

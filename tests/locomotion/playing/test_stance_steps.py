@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dynresp.locomotion.playing.stance_steps import stand_between
+from dynresp.locomotion.playing.stance_steps import keep_feet_planted
 from dynresp.motion.character import Character
 from dynresp.motion.motion import interpolate_moving
 from dynresp.motion.rotations import FloatArray
@@ -32,7 +32,7 @@ def test_a_foot_goes_straight_and_the_rest_is_as_it_was(character: Character) ->
     held = np.zeros((9, 2), dtype=bool)
     held[:, 0] = True
     step = np.zeros(9, dtype=np.intp)
-    out = stand_between(character, poses, (knots[:1], knots[1:]), step, part, held)
+    out = keep_feet_planted(character, poses, (knots[:1], knots[1:]), step, part, held)
     np.testing.assert_array_equal(out[[0, -1]], poses[[0, -1]])
     legs = [7 + 4 * character.joint(f"left_{x}") for x in ("hip", "knee", "ankle")]
     others = np.setdiff1d(np.arange(59), [k + i for k in legs for i in range(4)])
@@ -50,5 +50,5 @@ def test_a_foot_goes_straight_and_the_rest_is_as_it_was(character: Character) ->
 def test_nothing_is_led_that_does_not_stand(character: Character) -> None:
     knots, part, poses = _carried_on(character)
     air = np.zeros((9, 2), dtype=bool)
-    out = stand_between(character, poses, (knots[:1], knots[1:]), np.zeros(9, int), part, air)
+    out = keep_feet_planted(character, poses, (knots[:1], knots[1:]), np.zeros(9, int), part, air)
     np.testing.assert_array_equal(out, poses)

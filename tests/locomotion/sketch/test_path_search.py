@@ -3,7 +3,7 @@ import pytest
 
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.sketch.path_search import Found, SearchConfig, SearchGraph
 from dynresp.locomotion.worlds.collisions import CollisionGrid
@@ -22,12 +22,14 @@ CONFIG = GraphConfig(contact_change=False, sigma=3.0, slip_m=100.0)
 
 def made_graph(seed: int) -> MotionGraph:
     """Wandering roots: steps of 5 cm to all sides, a jump every few frames."""
-    return MotionGraph.of(made_database(np.random.default_rng(seed), (40, 30, 25)), CONFIG)
+    return MotionGraph.from_database(
+        made_database(np.random.default_rng(seed), (40, 30, 25)), CONFIG
+    )
 
 
 def search(
     tables: SearchGraph,
-    start: State,
+    start: AvatarState,
     path: FloatArray,
     target: float,
     budget: int = 400,
@@ -48,7 +50,7 @@ def test_it_equals_its_slow_twin(seed: int, boxes: bool, character: Character) -
     rng = np.random.default_rng([seed, 5])
     graph = made_graph(seed)
     tables = SearchGraph(graph, character)
-    start = State.at(graph, int(rng.choice(graph.frames)), 0.0, 0.0, 0.3)
+    start = AvatarState.at(graph, int(rng.choice(graph.frames)), 0.0, 0.0, 0.3)
     path = resampled([(0, 0), (0.6, 0.2), rng.uniform(0.5, 2.5, 2)], SPACING)
     target = rng.uniform(3.0, len(path) - 1.0)
     world = None
@@ -74,7 +76,7 @@ def test_it_equals_its_slow_twin_on_paths_that_turn_back(seed: int, character: C
     rng = np.random.default_rng([seed, 9])
     graph = made_graph(seed)
     tables = SearchGraph(graph, character)
-    start = State.at(graph, int(rng.choice(graph.frames)), 0.0, 0.0, 0.3)
+    start = AvatarState.at(graph, int(rng.choice(graph.frames)), 0.0, 0.0, 0.3)
     path = resampled([(0, 0), (0.7, 0.1), (0.7, 0.1), (0, 0), rng.uniform(-0.5, 0.5, 2)], SPACING)
     config = SearchConfig(stray=3.0, jump=0.3)
     target = len(path) - 1.5
@@ -91,7 +93,7 @@ def test_it_equals_its_slow_twin_on_paths_that_turn_back(seed: int, character: C
 def test_a_walk_between_boxes_equals_its_slow_twin(aside: float, character: Character) -> None:
     graph = walking_graph(character, sigma=0.3)
     tables = SearchGraph(graph, character)
-    start = State.at(graph, int(graph.frames[0]), 0.0, 0.0, 0.0)
+    start = AvatarState.at(graph, int(graph.frames[0]), 0.0, 0.0, 0.0)
     path = resampled([(0.0, 0.0), (3.0, 0.1)], SPACING)
     boxes = [Obstacle((1.5, side * (aside + 0.5)), (0.2, 0.5)) for side in (-1, 1)]
     world = World((-2.0, -2.0, 6.0, 2.0), tuple(boxes))
@@ -105,7 +107,7 @@ def test_a_walk_between_boxes_equals_its_slow_twin(aside: float, character: Char
 
 def test_what_is_found_can_be_walked_and_is_placed_as_it_is_played(character: Character) -> None:
     graph = made_graph(1)
-    start = State.at(graph, int(graph.frames[3]), 0.5, -0.2, 1.0)
+    start = AvatarState.at(graph, int(graph.frames[3]), 0.5, -0.2, 1.0)
     assert start.root(graph)[[0, 1, 3]] == pytest.approx([0.5, -0.2, 1.0])
     path = resampled([(0.5, -0.2), (1.5, 0.6)], SPACING)
     found = search(SearchGraph(graph, character), start, path, 8.0)
@@ -123,7 +125,7 @@ def test_what_is_faced_may_be_any_way_off(ahead_m: float, character: Character) 
     """Beyond the end of the path it is the end that is faced; integers do not reach so far."""
     graph = made_graph(1)
     tables = SearchGraph(graph, character)
-    start = State.at(graph, int(graph.frames[3]), 0.0, 0.0, 0.3)
+    start = AvatarState.at(graph, int(graph.frames[3]), 0.0, 0.0, 0.3)
     path = resampled([(0.0, 0.0), (1.0, 0.6)], SPACING)
     far = SearchConfig(ahead_m=100.0)
     expected = search(tables, start, path, 8.0, config=far)
@@ -138,17 +140,17 @@ def test_it_goes_on_where_blends_were_left(character: Character) -> None:
     graph = made_graph(2)
     tables = SearchGraph(graph, character)
     world = World((-4.0, -4.0, 4.0, 4.0))
-    start = State.at(graph, int(graph.frames[0]), 0.0, 0.0, 0.0)
+    start = AvatarState.at(graph, int(graph.frames[0]), 0.0, 0.0, 0.0)
     path = resampled([(0.0, 0.0), (2.0, 0.0)], SPACING)
     found = search(tables, start, path, 10.0, world=world)
     middle = len(found.joints) // 2
     at = int(found.joints[middle])
-    state = State(int(found.frames[at]), found.placements[at], found.displacements[middle])
+    state = AvatarState(int(found.frames[at]), found.placements[at], found.displacements[middle])
     whole = Playback(graph, start.frame, start.placement)
     whole.play(found.frames[: at + 1])
     rest = search(tables, state, path, 10.0, world=world, budget=1)
     again = search(
-        tables, State(whole.frame, whole.place, found.displacements[middle]), path, 10.0,
+        tables, AvatarState(whole.frame, whole.placement, found.displacements[middle]), path, 10.0,
         world=world, budget=1,
     )  # fmt: skip
     np.testing.assert_array_equal(rest.frames, again.frames)
@@ -158,7 +160,7 @@ def test_it_goes_on_where_blends_were_left(character: Character) -> None:
 def test_a_built_in_walk_goes_straight_on(character: Character) -> None:
     graph = walking_graph(character, sigma=0.3)
     tables = SearchGraph(graph, character)
-    start = State.at(graph, int(graph.frames[0]), 0.0, 0.0, 0.0)
+    start = AvatarState.at(graph, int(graph.frames[0]), 0.0, 0.0, 0.0)
     path = resampled([(0.0, 0.0), (3.0, 0.0)], SPACING)
     found = search(tables, start, path, 25.0)
     assert found.arrived
@@ -195,6 +197,6 @@ def test_what_makes_no_sense(character: Character) -> None:
         SearchConfig(farthest_m=0.0)
     graph = made_graph(0)
     tables = SearchGraph(graph, character)
-    nowhere = State(len(graph.database), np.zeros(4))
+    nowhere = AvatarState(len(graph.database), np.zeros(4))
     with pytest.raises(UsageError, match="component"):
         search(tables, nowhere, np.array([(0.0, 0.0), (0.1, 0.0)]), 1.0)

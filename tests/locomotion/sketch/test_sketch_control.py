@@ -9,7 +9,7 @@ from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.sketch.cluster_paths import SketchChooser
 from dynresp.locomotion.sketch.path_search import SearchGraph
@@ -54,9 +54,9 @@ def walker(motions_folder: Path) -> SearchGraph:
     return SearchGraph(MotionGraph.build(motions, GraphConfig()))
 
 
-def standing(tables: SearchGraph, x: float, y: float, yaw: float) -> State:
+def standing(tables: SearchGraph, x: float, y: float, yaw: float) -> AvatarState:
     frames = np.flatnonzero(tables.still) if tables.still.any() else tables.graph.frames
-    return State.at(tables.graph, int(frames[len(frames) // 3]), x, y, yaw)
+    return AvatarState.at(tables.graph, int(frames[len(frames) // 3]), x, y, yaw)
 
 
 def clearance(tables: SearchGraph, walk: SketchedWalk, world: World) -> float:
@@ -244,7 +244,7 @@ def test_what_is_of_another_kind(straight: SearchGraph) -> None:
     start, path = standing(straight, 0, 0, 0), [(0.0, 0.0), (1.0, 0.0)]
     with pytest.raises(UsageError, match=r"SearchGraph\(graph\), got MotionGraph"):
         follow_sketch(straight.graph, start, path)  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="the start must be a State"):
+    with pytest.raises(UsageError, match="the start must be an AvatarState"):
         follow_sketch(straight, path, start)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="the world must be a World of boxes, or None, got list"):
         follow_sketch(straight, start, path, [])  # type: ignore[arg-type]
@@ -252,12 +252,12 @@ def test_what_is_of_another_kind(straight: SearchGraph) -> None:
         reach(straight, start, (1.0, 0.0), None, {})  # type: ignore[arg-type]
     for wrong in (np.nan, np.inf, "a", None):
         with pytest.raises(UsageError, match="finite x, y"):
-            State.at(straight.graph, start.frame, 0.0, wrong, 0.0)  # type: ignore[arg-type]
+            AvatarState.at(straight.graph, start.frame, 0.0, wrong, 0.0)  # type: ignore[arg-type]
     for frame in (-1, len(straight.graph.database)):
         with pytest.raises(UsageError, match="the graph has frames 0 to"):
-            State.at(straight.graph, frame, 0.0, 0.0, 0.0)
+            AvatarState.at(straight.graph, frame, 0.0, 0.0, 0.0)
     with pytest.raises(UsageError, match="a state needs a frame"):
-        State.at(straight.graph, 1.5, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
+        AvatarState.at(straight.graph, 1.5, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -333,7 +333,7 @@ def test_actions_chosen_by_warping_follow_a_sketch_too(walker: SearchGraph) -> N
         playback, done = Playback(graph, start.frame, start.placement), 0
         roots = [start.root(graph)[None]]
         while done < len(path) - 5:
-            action = chooser.choose(playback.frame, playback.place, path[done:])
+            action = chooser.choose(playback.frame, playback.placement, path[done:])
             played = playback.play(action.frames[:15])
             roots.append(placement.compose(played.placements, graph.database.planar[played.frames]))
             done += int(np.argmin(np.hypot(*(path[done : done + 25] - roots[-1][-1, :2]).T)))

@@ -41,7 +41,7 @@ def waving(character: Character, frames: int, fps: float = FPS, pace: float = 1.
 def acting_database(character: Character) -> MotionDatabase:
     """Six seconds of either."""
     motions = [Motion(poses(character, 90), FPS, poses.__name__) for poses in (stepping, waving)]
-    return MotionDatabase.gather(motions, character)
+    return MotionDatabase.from_motions(motions, character)
 
 
 def acting_forest(character: Character) -> ClusterForest:

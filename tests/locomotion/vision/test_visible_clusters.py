@@ -45,19 +45,23 @@ def test_a_cluster_without_frames_is_dropped(forest, monkeypatch: pytest.MonkeyP
 
 def test_neither_position_nor_facing_nor_the_twist_of_a_straight_arm_counts(character) -> None:
     poses = stepping(character, 60)
-    plain = visible_observations(MotionDatabase.gather([Motion(poses, 15.0)], character), character)
+    plain = visible_observations(
+        MotionDatabase.from_motions([Motion(poses, 15.0)], character), character
+    )
     assert plain.shape == (60, 40)
     moved = Motion(poses, 15.0).placed(3.0, -2.0, 2.5)
     twisted = moved.poses.copy()
     column = 7 + 4 * character.joint("left_shoulder")
     twisted[:, column : column + 4] = rotations.about_axis((0.0, 0.0, 1.0), np.full(60, 0.8))
-    other = MotionDatabase.gather([Motion(twisted, 15.0)], character)
+    other = MotionDatabase.from_motions([Motion(twisted, 15.0)], character)
     np.testing.assert_allclose(visible_observations(other, character), plain, atol=1e-9)
 
 
 def test_speeds_are_those_of_the_person(character) -> None:
     poses = np.tile(character.rest_pose, (60, 1))
     poses[:, 1] += 1.2 * np.arange(60) / 15.0
-    seen = visible_observations(MotionDatabase.gather([Motion(poses, 15.0)], character), character)
+    seen = visible_observations(
+        MotionDatabase.from_motions([Motion(poses, 15.0)], character), character
+    )
     # 1.2 m/s to the left, of which each counts 0.7.
     np.testing.assert_allclose(seen[:, -3:], [[0.0, 0.84, 0.0]] * 60, atol=1e-9)

@@ -97,7 +97,7 @@ def test_a_hand_that_holds_stays_where_it_holds(
         )
         assert np.abs(there - hold.place).max() < 1e-3
         assert bars.bars[hold.bar].distance(hold.place) < 1e-9
-    assert (fitted.sliding == played.sliding).all()
+    assert (fitted.unfitted == played.unfitted).all()
     # Nothing leaps where holds begin and end.
     before = character.kinematics(played.motion.poses)
     was, now = (np.abs(np.diff(palms(character, x), axis=0)).max() for x in (before, states))

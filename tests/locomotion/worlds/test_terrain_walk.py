@@ -6,7 +6,7 @@ import pytest
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.playing.avatar_state import State
+from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.paths import distances_to
 from dynresp.locomotion.worlds.recorded_terrain import onto_blocks
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
@@ -121,7 +121,7 @@ def test_other_worlds_are_refused(made: TerrainGraph, character: Character) -> N
         reach_on_terrain(made, terrain, start, [50.0, 1.0])
     with pytest.raises(UsageError, match="at least 1 frame"):
         wander_on_terrain(made, terrain, start, 0, np.random.default_rng(0))
-    far = State(start.frame, start.placement + np.array([20 * BLOCK_M, 0.0, 0.0, 0.0]))
+    far = AvatarState(start.frame, start.placement + np.array([20 * BLOCK_M, 0.0, 0.0, 0.0]))
     with pytest.raises(UsageError, match="beside the grid"):
         reach_on_terrain(made, terrain, far, [1.0, 1.0])
     with pytest.raises(UsageError, match="no frame of the graph stands"):
@@ -150,7 +150,7 @@ def test_search_reaches_what_can_be_reached(made: TerrainGraph, seed: int) -> No
             cell = rng.integers(-2, 3, size=2)
             place = made.standing(terrain, int(frame), cell, turns)
             if place is not None and made.stands[frame].any():
-                states.append(State(int(frame), made.meters(terrain, place)))
+                states.append(AvatarState(int(frame), made.meters(terrain, place)))
     assert states
     state = states[rng.integers(len(states))]
     roots = np.array(slow.reachable(made, terrain, state))
