@@ -23,6 +23,7 @@ _TYPES = {
     "string_type": "text in quotes",
     "bool_type": "true or false",
     "int_type": "a whole number",
+    "float_type": "a number",
     "tuple_type": "a list in brackets",
     "list_type": "a list in brackets",
     "string_too_short": "at least one character",
@@ -114,9 +115,11 @@ def _place(model: type[BaseModel], location: Sequence[int | str], hints: Hints) 
     inside: list[type[BaseModel]] = [model]
     kind: str | None = None
     inside_kind: str | None = None
+    in_mapping = False
     for part in location:
-        if isinstance(part, int):
+        if isinstance(part, int) or in_mapping:
             keys.append(part)
+            in_mapping = False
             continue
         of_kind = [table for table in inside if part in _kinds(table)]
         if len(inside) > 1 and of_kind:
@@ -130,6 +133,7 @@ def _place(model: type[BaseModel], location: Sequence[int | str], hints: Hints) 
         else:
             keys.append(part)
         inside = _tables_in(held[0].annotation) if held else []
+        in_mapping = bool(held) and get_origin(held[0].annotation) is Mapping
     return _Place(keys, around, inside, kind)
 
 

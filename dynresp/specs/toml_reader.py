@@ -8,7 +8,7 @@ from typing import Any
 
 from dynresp.support.errors import SpecError
 
-MAX_FILE_BYTES = 1 << 20
+MAX_FILE_BYTES = 4 << 20
 """Largest file that is read [bytes]."""
 
 
@@ -18,7 +18,7 @@ def read_toml(path: Path, what: str, hint: str = "") -> dict[str, Any]:
     Args:
         path: The file.
         what: What it is, with an article, such as "an experiment file".
-        hint: A sentence for somebody who named no such file.
+        hint: What else the user can do if there is no such file; follows the message.
 
     Raises:
         SpecError: It cannot be read, is too large or not TOML. The message names the file.
@@ -30,8 +30,8 @@ def read_toml(path: Path, what: str, hint: str = "") -> dict[str, Any]:
         why = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
         raise SpecError(f"{path}: {why}; expected {what} (.toml)" + hint) from None
     if len(data) > MAX_FILE_BYTES:
-        name = what.partition(" ")[2]
-        raise SpecError(f"{path} is larger than {MAX_FILE_BYTES // 1024} KiB; no {name} is")
+        limit = f"{MAX_FILE_BYTES // 1024} KiB"
+        raise SpecError(f"{path} is larger than {limit}; expected {what} of at most {limit}")
     try:
         return tomllib.loads(data.decode("utf-8"))
     except UnicodeDecodeError as error:

@@ -169,7 +169,7 @@ def test_a_strike_needs_its_striker() -> None:
         (b"\xff\xfe", "is not text in UTF-8"),
         (b"= 3", "is not valid TOML"),
         (b"a = " + b"[" * 100_000, "is not valid TOML"),
-        (b"#" * (MAX_FILE_BYTES + 1), "is larger than 1024 KiB"),
+        (b"#" * (MAX_FILE_BYTES + 1), "is larger than 4096 KiB"),
         (b"", "experiment is missing"),
     ],
 )

@@ -169,13 +169,21 @@ def test_jump_flies_as_things_fall(tmp_path: Path, character: Character) -> None
     ("old", "new", "says"),
     [
         ('"turn"]', '"trun"]', "course: .*'turn'"),
-        ("forward = 0.3", "forwrad = 0.3", "turn: move 2: forwrad is not known here.*forward"),
-        ("forward = 0.3", "forward = 30", "turn: move 2: forward: .*3, got 30"),
-        ('do = "step", time', 'do = "hop", time', "turn: move 3: .*'step', 'stay', 'jump'"),
+        (
+            "forward = 0.3",
+            "forwrad = 0.3",
+            "turn 2.forwrad is not a key of .*forward",
+        ),
+        ("forward = 0.3", "forward = 30", "course.phrases.turn 2.forward: .*3, got 30"),
+        (
+            'do = "step", time',
+            'do = "hop", time',
+            "turn 3.do: .*step, stay, jump, got 'hop'",
+        ),
         ("time = 0.6, apart", 'foot = "left", apart', "the left foot is to go, but it went last"),
         ("0.7, at = [0.01, 0.03] },", '0.7 },\n  { do = "step" },', "begins and ends standing"),
         ('"turn"]', '"turn"]\nstart = [0]', "course.start"),
-        ("neck = {", "pelvis = { x = 0.1 }, neck = {", "move 1: posture: balance says where"),
+        ("neck = {", "pelvis = { x = 0.1 }, neck = {", "turn 1.posture: balance says where"),
         ("[course]", "[[key]]\ntime = 0\n[course]", "takes .*sway.* besides"),
     ],
 )

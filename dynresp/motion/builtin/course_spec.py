@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from dynresp.motion.builtin.posture_spec import Posture, Side, Strict
+from dynresp.motion.builtin.posture_spec import Posture, Side
+from dynresp.specs.shared_tables import Strict
 from dynresp.support.errors import UnknownNameError
 
 Metres = Annotated[float, Field(ge=-3.0, le=3.0)]

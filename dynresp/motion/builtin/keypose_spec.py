@@ -6,26 +6,23 @@ degrees under anatomical names, lengths in metres, times in seconds.
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from dynresp.motion.builtin.course_spec import Course, Jump, Stay, Step
+from dynresp.motion.builtin.course_spec import Course
 from dynresp.motion.builtin.posture_spec import (
     CHANNELS,
-    Limb,
-    Pelvis,
     Place,
     Posture,
     Side,
-    Strict,
-    Trunk,
 )
 from dynresp.motion.reactions.strategies import Strategy
-from dynresp.support.errors import SpecError, UnknownNameError
+from dynresp.specs import toml_errors
+from dynresp.specs.shared_tables import Strict
+from dynresp.specs.toml_errors import Hints
+from dynresp.support.errors import UnknownNameError
 
 Kind = Literal["walk", "idle", "guard", "punch", "locomotion", "reaction", "get_up"]
 
@@ -263,65 +260,4 @@ def read_spec(file: Path) -> BuiltinSpec:
         SpecError: It cannot be read, is not TOML, or holds something that is not allowed; the
             message names the file, the key, what was given and what is allowed.
     """
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(f"{file}: cannot be read as text ({error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{file}: not valid TOML: {error}") from None
-    try:
-        return BuiltinSpec.model_validate(data)
-    except ValidationError as error:
-        lines = [_explain(dict(item)) for item in error.errors()]
-        raise SpecError(f"{file}: " + "; ".join(lines)) from None
-
-
-_TABLES: Mapping[str, type[BaseModel]] = {
-    "pelvis": Pelvis,
-    "key": Key,
-    "rest": Key,
-    "stance": Stance,
-    "lying": Lying,
-    "prop": Prop,
-    "sway": Sway,
-    "gait": Gait,
-    "curves": Curves,
-    "course": Course,
-    "step": Step,
-    "stay": Stay,
-    "jump": Jump,
-    "posture": Posture,
-    **dict.fromkeys(("waist", "back", "neck"), Trunk),
-    **dict.fromkeys(
-        ("hips", "left_hip", "right_hip", "shoulders", "left_shoulder", "right_shoulder"), Limb
-    ),
-}
-
-
-def _explain(error: dict[str, Any]) -> str:
-    """One mistake in words: where, what was given, what is allowed."""
-    where = _location(error["loc"])
-    if error["type"] == "extra_forbidden":
-        parents = [part for part in error["loc"][:-1] if isinstance(part, str)]
-        table = _TABLES[parents[-1]] if parents else BuiltinSpec
-        allowed = ", ".join(field.alias or name for name, field in table.model_fields.items())
-        return f"{where} is not known here; allowed: {allowed}"
-    message = error["msg"].removeprefix("Value error, ")
-    if error["type"] == "missing":
-        return f"{where} is missing"
-    if error["type"] == "value_error":
-        return f"{where + ': ' if where else ''}{message}"
-    given = repr(error["input"])
-    return f"{where}: {message}, got {given if len(given) < 80 else given[:77] + '...'}"
-
-
-def _location(parts: tuple[int | str, ...]) -> str:
-    """A place in the file as a person counts: "key 3: left_hip.flexion"."""
-    if len(parts) > 3 and parts[:2] == ("course", "phrases") and isinstance(parts[3], int):
-        # The kind of the move stands between its number and what is wrong in it.
-        inner = ".".join(str(part) for part in parts[5:])
-        return f"{parts[2]}: move {parts[3] + 1}" + (f": {inner}" if inner else "")
-    if len(parts) > 1 and isinstance(parts[1], int):
-        inner = ".".join(str(part) for part in parts[2:])
-        return f"{parts[0]} {parts[1] + 1}" + (f": {inner}" if inner else "")
-    return ".".join(str(part) for part in parts)
+    return toml_errors.read_spec(BuiltinSpec, file, "a file of a built-in motion", Hints())

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from dynresp.specs.shared_tables import Strict
 
 Side = Literal["left", "right"]
 
@@ -30,12 +32,6 @@ Turn = Annotated[float, Field(ge=-720.0, le=720.0)]
 KneeAngle = Annotated[float, Field(ge=-5.0, le=158.0)]
 ElbowAngle = Annotated[float, Field(ge=-5.0, le=153.0)]
 AnkleAngle = Annotated[float, Field(ge=-60.0, le=45.0)]
-
-
-class Strict(BaseModel):
-    """A table that takes no key and no type but its own."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class Pelvis(Strict):

@@ -5,7 +5,6 @@ They are read from the files that need them, so that a collection cannot go stal
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -16,6 +15,7 @@ from dynresp.motion.sources.motion_folders import (
     checked_relative_path,
     fits_pattern,
 )
+from dynresp.specs.toml_reader import read_toml
 from dynresp.support.errors import SpecError, UnknownNameError
 from dynresp.support.paths import example_specs, reactions_folder
 
@@ -102,15 +102,10 @@ def files_named_in(library: Path) -> set[str]:
         SpecError: The file is missing, cannot be read, is not TOML, or names a path that leads
             out of a motions folder.
     """
-    try:
-        content = tomllib.loads(library.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(
-            f"the library {library} cannot be read ({error}); a collection of motion files is "
-            "made from it. Restore the file or install dynresp again."
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{library} is not valid TOML: {error}.") from error
+    hint = (
+        ". A collection of motion files is made from it; restore the file or install dynresp again."
+    )
+    content = read_toml(library, "a library or spec", hint)
     named: set[str] = set()
     for text in _texts_under(content, ("file", "motion")):
         if PurePosixPath(text).suffix.lower() in MOTION_SUFFIXES:

@@ -84,16 +84,20 @@ def test_identity_tells_libraries_apart(character: Character, folder: Path) -> N
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("strategy", "stratagem", "reaction 1 (duck): unknown key 'stratagem'; allowed: name, "),
-        ('name = "duck"\n', "", "reaction 1: name is missing"),
+        (
+            "strategy",
+            "stratagem",
+            "reaction.stratagem is not a key of [reaction] (did you mean 'strategy'?)",
+        ),
+        ('name = "duck"\n', "", "reaction.name is missing"),
         ('"duck"', '""', "name: expected a line of 1 to 200 characters, got ''"),
         ('"duck"', "7", "name: expected a line of 1 to 200 characters, got 7"),
         ('"duck"', '"duck_mirrored"', "must not end in '_mirrored'"),
-        ("upper_body_front", "faint", "strategy: got 'faint'; allowed: step_forward_small, "),
-        ('file = "a/b.npz"\n', "", "file is missing, or builtin in its place"),
+        ("upper_body_front", "faint", "reaction.strategy: expected 'step_forward_small', "),
+        ('file = "a/b.npz"\n', "", "file is missing; give file and frames, or builtin"),
         ("a/b.npz", "../b.npz", "'../b.npz' is not a path inside a motions folder"),
         ("a/b.npz", "a/b.png", "'a/b.png' is no motion file; its name must end in .amc"),
-        ("frames = [10, 30]\n", "", "frames: expected [first, one past the last]"),
+        ("frames = [10, 30]\n", "", "frames is missing; expected [first, one past the last]"),
         ("[10, 30]", "[30, 10]", "got [30, 10]"),
         ("[10, 30]", "[10, 11]", "at least two"),
         ("[10, 30]", "[-1, 30]", "got [-1, 30]"),
@@ -101,10 +105,14 @@ def test_identity_tells_libraries_apart(character: Character, folder: Path) -> N
         ("[10, 30]", "[10.0, 30.0]", "got [10.0, 30.0]"),
         ("[10, 30]", "[10, 41]", "frames: expected at most 40, the number of frames of a/b.npz"),
         ("frames", "note = 3\nframes", "note: expected a line"),
-        ("frames", 'builtin = "walk"\nframes', "either builtin, or file and frames"),
+        ("frames", 'builtin = "backward_roll"\nframes', "either builtin, or file and frames"),
         (GOOD, GOOD.replace("duck", "bow") + 'x = "', "not valid TOML"),
-        ("[[reaction]]\n", 'title = "x"\n[[reaction]]\n', "unknown key 'title'; allowed: reaction"),
-        ("[[reaction]]", "[reaction]", "expected one or more [[reaction]] tables"),
+        (
+            "[[reaction]]\n",
+            'title = "x"\n[[reaction]]\n',
+            "title is not a key of the file",
+        ),
+        ("[[reaction]]", "[reaction]", "reaction: write [[reaction]], with two brackets"),
         (GOOD, GOOD + "[[reaction]]\n" + GOOD, "'duck' is given to more than one reaction"),
     ],
 )
@@ -122,10 +130,10 @@ def test_wrong_file_is_refused_by_name(
 
 
 def test_no_file_and_no_text_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match=r"gone\.toml: cannot be read"):
+    with pytest.raises(SpecError, match=r"gone\.toml: no such file; expected a reaction library"):
         read_entries(tmp_path / "gone.toml")
     (tmp_path / "noise.toml").write_bytes(bytes(range(256)))
-    with pytest.raises(SpecError, match=r"noise\.toml: not valid TOML"):
+    with pytest.raises(SpecError, match=r"noise\.toml is not text in UTF-8"):
         read_entries(tmp_path / "noise.toml")
 
 
