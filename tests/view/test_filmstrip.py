@@ -11,10 +11,20 @@ import pytest
 from dynresp.motion.motion import Motion
 from dynresp.support.errors import DynrespError
 from dynresp.view.filmstrip import FilmstripConfig, write_filmstrip
-from dynresp.view.story import Block, GroundPath, MovingCapsule, Story, StoryEvent
+from dynresp.view.story import Block, GroundPath, MovingCapsule, Story, StoryEvent, StoryPhase
 from tests.view.samples import story_of, striding
 
 SMALL = FilmstripConfig(width_px=700, moments=5)
+FILES = ("a.png", "b.png")
+BASE = (0.30, 0.50, 0.74)
+"""Colour of a shirt during the base motion."""
+
+
+def pixels_of(picture: np.ndarray, hue: tuple[float, float, float]) -> np.ndarray:
+    """(height, width) which pixels have a hue, however bright."""
+    flat = picture[..., :3]
+    unit = flat / np.linalg.norm(flat, axis=-1, keepdims=True).clip(1e-6)
+    return unit @ (np.array(hue) / np.linalg.norm(hue)) > 0.995
 
 
 def test_a_picture_of_the_width_asked_for(
@@ -28,11 +38,8 @@ def test_a_picture_of_the_width_asked_for(
     assert [p.name for p in file.parent.iterdir()] == ["filmstrip.png"]
     assert capfd.readouterr().out == ""
     # Shirts in the colours of all four phases.
-    for hue in ((0.30, 0.50, 0.74), (0.90, 0.36, 0.17), (0.95, 0.71, 0.22), (0.22, 0.62, 0.48)):
-        flat = picture[..., :3].reshape(-1, 3)
-        unit = flat / np.linalg.norm(flat, axis=1, keepdims=True).clip(1e-6)
-        alike = unit @ (np.array(hue) / np.linalg.norm(hue)) > 0.995
-        assert alike.sum() > 300, hue
+    for hue in (BASE, (0.90, 0.36, 0.17), (0.95, 0.71, 0.22), (0.22, 0.62, 0.48)):
+        assert pixels_of(picture, hue).sum() > 300, hue
 
 
 def test_a_second_character_and_an_arm(tmp_path: Path, crowded_story: Story) -> None:
@@ -43,7 +50,9 @@ def test_a_second_character_and_an_arm(tmp_path: Path, crowded_story: Story) -> 
 @pytest.mark.parametrize("frames", [1, 2])
 def test_the_shortest_motions(tmp_path: Path, frames: int) -> None:
     write_filmstrip(Story(striding(frames, 1.0)), tmp_path / "a.png", SMALL)
-    assert (tmp_path / "a.png").exists()
+    picture = matplotlib.image.imread(tmp_path / "a.png")[..., :3]
+    # A coloured figure stands on a grey floor.
+    assert (np.ptp(picture, axis=-1) > 0.1).sum() > 300
 
 
 def test_far_travel_needs_no_second_picture(tmp_path: Path) -> None:
@@ -112,17 +121,27 @@ def test_importing_the_views_imports_nothing_heavy() -> None:
     assert done.stdout.split() == []
 
 
-def test_numbers_stay_finite_for_a_figure_lying_down(tmp_path: Path) -> None:
+def test_a_figure_lying_down(tmp_path: Path) -> None:
     motion = striding(30, 0.0)
     poses = motion.poses.copy()
     poses[:, 2], poses[:, 3:7] = 0.12, (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
-    lying = story_of(Motion(poses, motion.fps))
-    write_filmstrip(lying, tmp_path / "a.png", SMALL)
-    assert np.isfinite(matplotlib.image.imread(tmp_path / "a.png")).all()
+    tall = []
+    for shown in (motion, Motion(poses, motion.fps)):
+        story = story_of(shown, events=[], phases=[StoryPhase("base motion", 0.0, shown.duration)])
+        write_filmstrip(story, tmp_path / "a.png", SMALL)
+        shirt = pixels_of(matplotlib.image.imread(tmp_path / "a.png"), BASE)
+        assert shirt.sum() > 300
+        tall.append(np.ptp(np.flatnonzero(shirt.any(axis=1))))
+    # A trunk that lies is less high than one that stands, though it is drawn as long.
+    assert tall[1] < 0.7 * tall[0]
 
 
 def test_dollar_signs_are_no_mathematics(tmp_path: Path) -> None:
     text = "price $\\foo{$ up"
     told = story_of(striding(30, 1.3), title=text, subtitle=text, events=[StoryEvent(text, 0.3)])
     write_filmstrip(told, tmp_path / "a.png", SMALL)
-    assert (tmp_path / "a.png").exists()
+    plain = story_of(striding(30, 1.3), title="", subtitle="", events=[StoryEvent("", 0.3)])
+    write_filmstrip(plain, tmp_path / "b.png", SMALL)
+    # The title is written, in dark letters on white: there is more ink than without it.
+    ink = [int((matplotlib.image.imread(tmp_path / n)[:40, :, 0] < 0.5).sum()) for n in FILES]
+    assert ink[0] > ink[1] + 100
