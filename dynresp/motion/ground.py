@@ -5,8 +5,6 @@ The floor is the plane z = 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 import numpy.typing as npt
@@ -16,20 +14,12 @@ from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.runs import runs
 
-
-@dataclass(frozen=True)
-class ContactConfig:
-    """When a foot counts as standing.
-
-    Attributes:
-        height: Some corner of its sole is at most this high [m],
-        speed: and moves at most this fast [m/s].
-        gap_s: Contacts and gaps shorter than this are noise [s].
-    """
-
-    height: float = 0.045
-    speed: float = 0.55
-    gap_s: float = 0.07
+CONTACT_HEIGHT = 0.045
+"""A foot stands if some corner of its sole is at most this high [m] ..."""
+CONTACT_SPEED = 0.55
+"""... and that corner moves at most this fast [m/s]."""
+CONTACT_GAP_S = 0.07
+"""Contacts, and gaps between them, that are shorter than this are noise [s]."""
 
 
 def clearances(character: Character, states: BodyStates) -> FloatArray:
@@ -83,21 +73,17 @@ def sole_points(character: Character, side: str) -> FloatArray:
     return np.array([center + half * np.array([x, y, -1.0]) for x, y in corners])
 
 
-def foot_contacts(
-    character: Character, states: BodyStates, fps: float, config: ContactConfig | None = None
-) -> npt.NDArray[np.bool_]:
+def foot_contacts(character: Character, states: BodyStates, fps: float) -> npt.NDArray[np.bool_]:
     """Which feet stand: some corner of the sole is low and slow.
 
     Args:
         character: The character.
         states: Its bodies over some frames.
         fps: Frame rate [1/s].
-        config: Thresholds.
 
     Returns:
         (frames, 2): left, right.
     """
-    config = config or ContactConfig()
     columns = []
     for side in ("left", "right"):
         foot = character.body(f"{side}_foot")
@@ -108,8 +94,8 @@ def foot_contacts(
             speed = np.linalg.norm(np.gradient(points, 1.0 / fps, axis=0), axis=-1)
         else:
             speed = np.zeros(points.shape[:2])
-        standing = ((points[..., 2] <= config.height) & (speed <= config.speed)).any(axis=1)
-        shortest = max(1, round(config.gap_s * fps))
+        standing = ((points[..., 2] <= CONTACT_HEIGHT) & (speed <= CONTACT_SPEED)).any(axis=1)
+        shortest = max(1, round(CONTACT_GAP_S * fps))
         columns.append(_without_short_runs(standing, shortest))
     return np.stack(columns, axis=1)
 

@@ -12,7 +12,7 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
 from dynresp.motion.readers import read_motion_file
 from dynresp.motion.readers.npz import read_npz
-from dynresp.motion.retargeting.retarget import RetargetConfig, retarget, trim_t_poses
+from dynresp.motion.retargeting.retarget import retarget, trim_t_poses
 from dynresp.support.errors import MotionError, MotionFileError
 
 # Motions kept in memory; the whole development collection is about 150 MB.
@@ -119,7 +119,7 @@ def _load(path: Path, stamps: _Stamps, character: Character, options: LoadOption
             path, asf_path=options.asf, unit=options.unit, up=options.up, fps=options.fps
         )
         try:
-            motion = retarget(skeleton, character, RetargetConfig(flat_floor=options.flat_floor))
+            motion = retarget(skeleton, character, flat_floor=options.flat_floor)
         except MotionError as error:
             raise MotionFileError(f"{path}: {error}") from error
     return trim_t_poses(character, motion) if options.trim_t_poses else motion

@@ -165,6 +165,9 @@ def _explain(
         return _unknown_key(
             where, what, [n for n in names if n != hints.inner and n not in hints.hidden]
         )
+    if error["type"] == "missing" and isinstance(place.keys[-1], int):
+        count, given = place.keys[-1] + 1, shown(list(error["input"]))
+        return f"{where}: expected at least {count} values in brackets, got {given}"
     if error["type"] == "missing":
         needed = "this kind of table needs it" if place.kind else "it is needed here"
         return f"{where} is missing; {hints.missing.get(str(place.keys[-1]), needed)}"

@@ -2,9 +2,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from dynresp.motion import rotations
+from dynresp.motion import ground, rotations
 from dynresp.motion.character import ROOT, Character
-from dynresp.motion.ground import ContactConfig, clearances, foot_contacts, sole_points
+from dynresp.motion.ground import clearances, foot_contacts, sole_points
 from dynresp.support import paths
 from tests.motion.samples import random_poses
 from tests.oracles import kinematics as slow
@@ -58,10 +58,8 @@ class TestSolePoints:
 class TestFootContacts:
     FPS = 60.0
 
-    def contacts(
-        self, character: Character, poses: np.ndarray, config: ContactConfig | None = None
-    ) -> np.ndarray:
-        return foot_contacts(character, character.kinematics(poses), self.FPS, config)
+    def contacts(self, character: Character, poses: np.ndarray) -> np.ndarray:
+        return foot_contacts(character, character.kinematics(poses), self.FPS)
 
     def standing(self, character: Character, frames: int) -> np.ndarray:
         return np.tile(character.rest_pose, (frames, 1))
@@ -84,17 +82,23 @@ class TestFootContacts:
         # Central differences see the jump one frame away from it on either side.
         np.testing.assert_array_equal(np.flatnonzero(~found[:, 1]), np.arange(19, 41))
 
-    def test_a_foot_that_slides_does_not_stand(self, character: Character) -> None:
+    def test_a_foot_that_slides_does_not_stand(
+        self, character: Character, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         poses = self.standing(character, 30)
         poses[:, ROOT] += np.linspace(0.0, 29 / self.FPS, 30)[:, None] * [0.6, 0.0, 0.0]
         assert not self.contacts(character, poses).any()
-        assert self.contacts(character, poses, ContactConfig(speed=0.65)).all()
+        monkeypatch.setattr(ground, "CONTACT_SPEED", 0.65)
+        assert self.contacts(character, poses).all()
 
-    def test_a_foot_in_the_air_does_not_stand(self, character: Character) -> None:
+    def test_a_foot_in_the_air_does_not_stand(
+        self, character: Character, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         poses = self.standing(character, 30)
         poses[:, 2] += 0.05
         assert not self.contacts(character, poses).any()
-        assert self.contacts(character, poses, ContactConfig(height=0.06)).all()
+        monkeypatch.setattr(ground, "CONTACT_HEIGHT", 0.06)
+        assert self.contacts(character, poses).all()
 
     def test_a_heel_or_a_ball_is_enough(self, character: Character) -> None:
         poses = self.standing(character, 10)
@@ -105,19 +109,22 @@ class TestFootContacts:
 
     @pytest.mark.parametrize(("length", "kept"), [(2, False), (3, False), (4, True), (8, True)])
     def test_short_hops_and_short_touches_are_noise(
-        self, character: Character, length: int, kept: bool
+        self, character: Character, length: int, kept: bool, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        config = ContactConfig(speed=1e3)  # heights alone
+        monkeypatch.setattr(ground, "CONTACT_SPEED", 1e3)  # heights alone
         hop = self.standing(character, 40)
         hop[10 : 10 + length, 2] += 0.2
-        assert (~self.contacts(character, hop, config)).any() == kept
+        assert (~self.contacts(character, hop)).any() == kept
         touch = self.standing(character, 40)
         touch[:, 2] += 0.2
         touch[10 : 10 + length, 2] -= 0.2
-        assert self.contacts(character, touch, config).any() == kept
+        assert self.contacts(character, touch).any() == kept
 
-    def test_short_contacts_at_the_ends_stay(self, character: Character) -> None:
+    def test_short_contacts_at_the_ends_stay(
+        self, character: Character, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(ground, "CONTACT_SPEED", 1e3)
         poses = self.standing(character, 40)
         poses[1:-1, 2] += 0.2
-        found = self.contacts(character, poses, ContactConfig(speed=1e3))
+        found = self.contacts(character, poses)
         np.testing.assert_array_equal(np.flatnonzero(found[:, 0]), [0, 39])

@@ -9,14 +9,14 @@ retargeting; they are right to some 5 cm, and what nobody touched is missing.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.worlds.world_contacts import palms, sole_corners, speeds, steady
 from dynresp.motion.character import Character
-from dynresp.motion.ground import ContactConfig
+from dynresp.motion.ground import CONTACT_GAP_S, CONTACT_HEIGHT, CONTACT_SPEED
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
@@ -131,14 +131,12 @@ class TouchConfig:
         hand_speed: and moves at most this fast [m/s]; hands slip along as their arms turn.
         foot_reach: The same of the middle of a sole,
         foot_speed: and its speed.
-        ground: When a foot stands on the ground; `gap_s` holds for all contacts.
     """
 
     hand_reach: float = 0.13
     hand_speed: float = 0.8
     foot_reach: float = 0.10
     foot_speed: float = 0.5
-    ground: ContactConfig = field(default_factory=ContactConfig)
 
 
 @functools.cache
@@ -168,8 +166,8 @@ def playground_contacts(
     config = config or TouchConfig()
     states = character.kinematics(motion.poses)
     corners = sole_corners(character, states)
-    low = corners[..., 2] <= config.ground.height
-    standing = (low & (speeds(corners, motion.fps) <= config.ground.speed)).any(axis=2)
+    low = corners[..., 2] <= CONTACT_HEIGHT
+    standing = (low & (speeds(corners, motion.fps) <= CONTACT_SPEED)).any(axis=2)
     hands, soles = palms(character, states), corners.mean(axis=2)
     if playground.bars:
         standing |= (playground.nearest(soles)[1] <= config.foot_reach) & (
@@ -180,4 +178,4 @@ def playground_contacts(
         )
     else:
         holding = np.zeros(hands.shape[:2], dtype=bool)
-    return steady(np.concatenate([standing, holding], axis=1), motion.fps, config.ground.gap_s)
+    return steady(np.concatenate([standing, holding], axis=1), motion.fps, CONTACT_GAP_S)

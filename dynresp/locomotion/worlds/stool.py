@@ -17,7 +17,6 @@ from dynresp.locomotion.worlds.obstacles import Obstacle, World, box_distance
 from dynresp.locomotion.worlds.world_contacts import feet_on, sole_corners
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
-from dynresp.motion.ground import ContactConfig
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
@@ -43,21 +42,18 @@ def stool_ground(points: npt.ArrayLike) -> FloatArray:
     return np.where(box_distance(at, stool_world().boxes[0]) <= 0.0, SIDE_M, 0.0)
 
 
-def stool_contacts(
-    motion: Motion, character: Character, config: ContactConfig | None = None
-) -> BoolArray:
+def stool_contacts(motion: Motion, character: Character) -> BoolArray:
     """Which feet stand on the floor or on the stool, by how near and how slow they are.
 
     Args:
         motion: In the world of the stool.
         character: Whose motion it is.
-        config: Thresholds.
 
     Returns:
         (frames, 2): left, right.
     """
     corners = sole_corners(character, character.kinematics(motion.poses))
-    return feet_on(stool_ground, corners, motion.fps, config)
+    return feet_on(stool_ground, corners, motion.fps)
 
 
 def stool_motions(character: Character) -> list[Motion]:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from dynresp.motion import rotations
 from dynresp.motion.character import BodyStates, Character
-from dynresp.motion.ground import ContactConfig, sole_points
+from dynresp.motion.ground import CONTACT_GAP_S, CONTACT_HEIGHT, CONTACT_SPEED, sole_points
 from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
@@ -146,24 +146,22 @@ def heights_above(ground: Ground, soles: FloatArray) -> FloatArray:
     return np.asarray(soles[..., 2] - ground(middle + _INNER * (soles[..., :2] - middle)))
 
 
-def feet_on(
-    ground: Ground, corners: FloatArray, fps: float, config: ContactConfig | None = None
-) -> BoolArray:
+def feet_on(ground: Ground, corners: FloatArray, fps: float) -> BoolArray:
     """Which feet stand on uneven ground: some corner of the sole is near it and slow.
+
+    As near and as slow as on level ground (`dynresp.motion.ground`).
 
     Args:
         ground: Its height.
         corners: (frames, 2, 4, 3) corners of the soles [m].
         fps: Frame rate [1/s].
-        config: Thresholds, the same as on level ground.
 
     Returns:
         (frames, 2): left, right.
     """
-    config = config or ContactConfig()
-    low = heights_above(ground, corners) <= config.height
-    near = np.any(low & (speeds(corners, fps) <= config.speed), axis=2)
-    return steady(near, fps, config.gap_s)
+    low = heights_above(ground, corners) <= CONTACT_HEIGHT
+    near = np.any(low & (speeds(corners, fps) <= CONTACT_SPEED), axis=2)
+    return steady(near, fps, CONTACT_GAP_S)
 
 
 def steady(flags: BoolArray, fps: float, gap_s: float) -> BoolArray:

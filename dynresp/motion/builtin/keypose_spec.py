@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from dynresp.motion.builtin.course_spec import Course
 from dynresp.motion.builtin.posture_spec import (
     CHANNELS,
-    Place,
+    Coordinate,
     Posture,
     Side,
 )
@@ -79,7 +79,7 @@ class Stance(_Span):
     """
 
     foot: Side
-    at: tuple[Place, Place]
+    at: tuple[Coordinate, Coordinate]
     turn: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
     heel: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     land: Annotated[float, Field(ge=-60.0, le=40.0)] = 0.0
@@ -106,7 +106,7 @@ class Prop(_Span):
     """
 
     hand: Side
-    at: tuple[Place, Place]
+    at: tuple[Coordinate, Coordinate]
 
     _point = model_validator(mode="before")(_point)
 

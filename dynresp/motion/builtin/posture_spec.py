@@ -27,8 +27,8 @@ CHANNELS: tuple[str, ...] = (
 )
 """Every value that key poses set and sways move."""
 
-Place = Annotated[float, Field(ge=-100.0, le=100.0)]
-Turn = Annotated[float, Field(ge=-720.0, le=720.0)]
+Coordinate = Annotated[float, Field(ge=-100.0, le=100.0)]
+Angle = Annotated[float, Field(ge=-720.0, le=720.0)]
 KneeAngle = Annotated[float, Field(ge=-5.0, le=158.0)]
 ElbowAngle = Annotated[float, Field(ge=-5.0, le=153.0)]
 AnkleAngle = Annotated[float, Field(ge=-60.0, le=45.0)]
@@ -37,12 +37,12 @@ AnkleAngle = Annotated[float, Field(ge=-60.0, le=45.0)]
 class Pelvis(Strict):
     """Where the pelvis is [m] and how it is turned [deg]; what is left out is not keyed."""
 
-    x: Place | None = None
-    y: Place | None = None
+    x: Coordinate | None = None
+    y: Coordinate | None = None
     height: Annotated[float, Field(ge=-1.0, le=3.0)] | None = None
-    pitch: Turn | None = None
-    roll: Turn | None = None
-    yaw: Turn | None = None
+    pitch: Angle | None = None
+    roll: Angle | None = None
+    yaw: Angle | None = None
 
 
 class Trunk(Strict):

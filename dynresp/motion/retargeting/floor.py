@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -15,101 +13,86 @@ from dynresp.motion.motion import FEET
 from dynresp.motion.rotations import FloatArray
 from dynresp.support import smoothing
 
-# Part of the heights that the floor is above: feet that stand higher (on a step, on their toes) are
+PULL_DOWN = 0.04
+"""A standing foot is pulled down to the floor from at most this height [m]."""
+RAMP_S = 0.12
+"""Time in which a foot is eased onto the floor and off it, or the body lifted [s]."""
+SINK = 0.01
+"""How deep a body may press into the floor [m]: flesh gives, and so do simulated contacts."""
+
+# A foot slower than this [m/s] counts when the floor is searched. Where feet stand for less than
+# this time in all [s], they do not show where it is.
+_STANDING_SPEED = 0.25
+_STANDING_S = 0.2
+# This part of the heights is below the floor: feet that stand higher (on a step, on their toes) are
 # more frequent than feet in the floor.
 _LOW = 0.25
-# Times that bodies are lifted out of the floor once more, and how little [m] is not worth it.
+# How often bodies are lifted out of the floor once more, and below which height [m] they are not.
 _ROUNDS = 5
 _DONE = 1e-3
 # In the forearm's frame: where the fingers end (models/ragdoll.xml) [m], and the axis about which
 # the elbow flexes.
 _FINGERTIPS = np.array([0.0, 0.0, -0.41])
 _FLEXION = np.array([0.0, -1.0, 0.0])
-# A foot is not pulled farther than to this part of its leg's length: on the last few millimetres a
-# knee turns by 10 degrees and more.
+# A foot is pulled to at most this part of its leg's length: on the last few millimetres a knee
+# turns by 10 degrees and more.
 _STRAIGHT = 0.995
-# Nor is one pulled whose hip and ankle are nearer than this part of it; from twice that on, wholly.
+# A foot whose hip and ankle are nearer than this part of it is not pulled; from twice that on, it
+# is pulled fully.
 _FOLDED = 0.3
 
 
-@dataclass(frozen=True)
-class FloorConfig:
-    """How the feet and the body are set on the floor.
-
-    Attributes:
-        standing_speed: A foot slower than this [m/s] counts when the floor is looked for.
-        standing_s: Where feet stand for less time than this in all [s], they do not tell the floor.
-        pull_down: A standing foot is pulled down to the floor from at most this height [m].
-        ramp_s: Time over which a foot is eased onto the floor and off it, or the body lifted [s].
-        sink: How deep a body may press into the floor [m]: flesh gives, and so do simulated
-            contacts.
-    """
-
-    standing_speed: float = 0.25
-    standing_s: float = 0.2
-    pull_down: float = 0.04
-    ramp_s: float = 0.12
-    sink: float = 0.01
-
-
-def find_floor(
-    character: Character, poses: FloatArray, fps: float, config: FloorConfig | None = None
-) -> float:
+def find_floor(character: Character, poses: FloatArray, fps: float) -> float:
     """Height of the floor [m] in a motion's own coordinates: where its slow feet stand.
 
-    Only frames count in which nothing else of the body is lower, since lying, sitting and climbing
-    people hold their feet up. Where there are too few, the lowest part of the body has to do.
+    Only frames count in which no other part of the body is lower, since people who lie, sit or
+    climb hold their feet up. If these are too few, the lowest part of the body counts.
     """
-    config = config or FloorConfig()
     states = character.kinematics(poses)
     low = clearances(character, states)
     soles = low[:, _feet(character)]
     heights = low.min(axis=1)
-    standing = soles.min(axis=1) <= heights + config.sink
+    standing = soles.min(axis=1) <= heights + SINK
     if len(poses) > 1:
         ankles = legs.ankle_positions(character, states)
         speeds = np.linalg.norm(np.gradient(ankles, 1.0 / fps, axis=0), axis=-1)
-        standing &= speeds[np.arange(len(soles)), soles.argmin(axis=1)] < config.standing_speed
-    if np.count_nonzero(standing) < min(config.standing_s * fps, len(poses)):
+        standing &= speeds[np.arange(len(soles)), soles.argmin(axis=1)] < _STANDING_SPEED
+    if np.count_nonzero(standing) < min(_STANDING_S * fps, len(poses)):
         return float(np.quantile(heights, _LOW))
     return float(np.quantile(soles.min(axis=1)[standing], _LOW))
 
 
-def settle(
-    character: Character, poses: FloatArray, fps: float, config: FloorConfig | None = None
-) -> FloatArray:
+def settle(character: Character, poses: FloatArray, fps: float) -> FloatArray:
     """Put a motion whose floor is at height 0 on it.
 
-    Arms are bent whose hands would be deeper in the floor than they may: the character's wrists are
+    An arm is bent if its hand would be deeper in the floor than `SINK`: the character's wrists are
     stiff, and people lean on theirs. The root is raised, smoothly, where a body other than a foot
-    still would be. Then the legs are bent or stretched so that feet that stand touch the floor, as
-    far as straight legs reach, and no foot is below it.
+    would still be deeper. Then the legs are bent or stretched so that standing feet touch the
+    floor, as far as straight legs reach, and no foot is below it.
 
     Args:
         character: The character.
         poses: (frames, 59).
         fps: Frame rate [1/s].
-        config: How.
 
     Returns:
         (frames, 59).
     """
-    config = config or FloorConfig()
-    poses = _raise_hands(character, poses, config)
+    poses = _raise_hands(character, poses)
     states = character.kinematics(poses)
     low = clearances(character, states)
-    lift = _lift(character, low, fps, config)
+    lift = _lift(character, low, fps)
     sole = low[:, _feet(character)] + lift[:, None]
     contacts = foot_contacts(character, states, fps)
     # The root's rise does not concern feet that stand.
-    most = (config.pull_down + lift)[:, None]
-    ramp = max(1, round(config.ramp_s * fps))
+    most = (PULL_DOWN + lift)[:, None]
+    ramp = max(1, round(RAMP_S * fps))
     pull = _ease_away(np.clip(sole, 0.0, most), contacts, ramp)
     pull = np.minimum(pull, _slack(character, states) + lift[:, None])
     settled = _move(character, poses, lift, -np.minimum(sole, pull))
     # Knees that the feet have pushed below the floor; they go on standing where they can.
     for stand in [True] * _ROUNDS + [False]:
-        lift = _lift(character, clearances(character, character.kinematics(settled)), fps, config)
+        lift = _lift(character, clearances(character, character.kinematics(settled)), fps)
         if lift.max() < _DONE:
             break
         kept = lift[:, None] if stand else np.zeros((len(lift), 1))
@@ -117,40 +100,36 @@ def settle(
     return settled
 
 
-def raise_above(
-    character: Character, poses: FloatArray, fps: float, config: FloorConfig | None = None
-) -> FloatArray:
-    """Lift out of the floor what is below it, and leave all else as it is.
+def raise_above(character: Character, poses: FloatArray, fps: float) -> FloatArray:
+    """Lift what is below the floor out of it; all else stays.
 
     Args:
         character: The character.
         poses: (frames, 59).
         fps: Frame rate [1/s].
-        config: How.
 
     Returns:
         (frames, 59). Frames that are clear of the floor, and not near one that is not, are the
         same.
     """
-    config = config or FloorConfig()
     low = clearances(character, character.kinematics(poses))
-    lift = _lift(character, low, fps, config)
+    lift = _lift(character, low, fps)
     sole = low[:, _feet(character)] + lift[:, None]
-    return _move(character, poses, lift, np.maximum(-config.sink - sole, 0.0))
+    return _move(character, poses, lift, np.maximum(-SINK - sole, 0.0))
 
 
-def _raise_hands(character: Character, poses: FloatArray, config: FloorConfig) -> FloatArray:
-    """Bend the arms so that the hands are no deeper than they may be, as far as arms reach."""
+def _raise_hands(character: Character, poses: FloatArray) -> FloatArray:
+    """Bend the arms so that no hand is deeper than `SINK`, as far as arms reach."""
     states = character.kinematics(poses)
     low = clearances(character, states)
     world = states.quaternions.copy()
     for side in FEET:
         upper, lower = (character.body(f"{side}_{part}") for part in ("upper_arm", "forearm"))
-        deep = np.flatnonzero(low[:, lower] < -config.sink)
+        deep = np.flatnonzero(low[:, lower] < -SINK)
         elbow, turned = states.positions[deep, lower], world[deep, lower]
         tip = elbow + rotations.rotate(turned, _FINGERTIPS)
         target = tip.copy()
-        target[:, 2] -= low[deep, lower] + config.sink
+        target[:, 2] -= low[deep, lower] + SINK
         lateral = rotations.rotate(world[deep, upper], _FLEXION)
         turns = legs.bend_turns(states.positions[deep, upper], elbow, tip, lateral, target)
         world[deep, upper] = rotations.multiply(turns[0], world[deep, upper])
@@ -164,11 +143,11 @@ def _feet(character: Character) -> list[int]:
     return [character.body(f"{side}_foot") for side in FEET]
 
 
-def _lift(character: Character, low: FloatArray, fps: float, config: FloorConfig) -> FloatArray:
+def _lift(character: Character, low: FloatArray, fps: float) -> FloatArray:
     """How far to raise the root in each frame (frames,) [m]."""
     others = np.setdiff1d(np.arange(low.shape[1]), _feet(character))
-    need = np.maximum(0.0, -config.sink - low[:, others].min(axis=1))
-    return smoothing.cover(need, max(1, round(config.ramp_s * fps)))
+    need = np.maximum(0.0, -SINK - low[:, others].min(axis=1))
+    return smoothing.cover(need, max(1, round(RAMP_S * fps)))
 
 
 def _move(
@@ -204,7 +183,7 @@ def _slack(character: Character, states: BodyStates) -> FloatArray:
 
 
 def _ease_away(values: FloatArray, held: npt.NDArray[np.bool_], ramp: int) -> FloatArray:
-    """Values (frames, columns) where they are held; elsewhere eased from the held ones to zero.
+    """Values (frames, columns) in held frames; elsewhere eased from the nearest held ones to zero.
 
     Args:
         values: Not negative.

@@ -1,8 +1,9 @@
-"""The pose from which a skeleton's rotations are told: upright, whatever the file rests in.
+"""An upright rest pose for a skeleton, whatever rest pose its file has.
 
-Retargeting compares segments with a rest pose in which trunk and legs are straight. Most files rest
-so, some lying down (their up axis was changed later on), and some in no pose of a person at all:
-every bone along one axis. The latter show how they stand in their motion alone.
+Retargeting compares segments with a rest pose in which trunk and legs are straight. In most files
+the rest pose is so; in some it lies down (their up axis was changed later), and in some it is no
+pose of a person at all: every bone along one axis. Only the motion of the last kind shows how the
+person stands.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from dynresp.motion.retargeting.segments import Segments
 from dynresp.motion.rotations import FloatArray
 
 _UP = np.array([0.0, 0.0, 1.0])
+# A rest pose is upright if trunk, thighs and shanks lean less than this [rad], and the shoulders
+# are turned less against the hips.
+_MAX_TILT = np.radians(35.0)
 # A rest pose whose own up axis is so near [rad] to one of the file's axes was meant to stand on it.
 _NEAR_AXIS = np.radians(20.0)
 # Frames whose trunk and legs are bent by so much more than in the straightest one, summed over the
@@ -23,30 +27,25 @@ _NEAR_AXIS = np.radians(20.0)
 _AS_STRAIGHT = 0.25
 
 
-def with_upright_rest(
-    skeleton: SkeletonMotion, segments: Segments, tilt_deg: float
-) -> SkeletonMotion:
-    """The same motion told from an upright rest pose.
+def with_upright_rest(skeleton: SkeletonMotion, segments: Segments) -> SkeletonMotion:
+    """The same motion, relative to an upright rest pose.
 
     Args:
         skeleton: The source.
         segments: Its joints.
-        tilt_deg: A rest pose is upright if trunk, thighs and shanks lean less than this, and the
-            shoulders are turned less against the hips.
 
     Returns:
-        The source itself if its rest pose is upright; with its rest pose turned if that is straight
-        but lies; else with the mean of the frames in which the person is straightest as rest pose.
+        The source itself if its rest pose is upright; with its rest pose turned if that is
+        straight but lies down; else with the mean of the straightest frames as rest pose.
     """
     rest = skeleton.rest_positions()[None]
-    limit = np.radians(tilt_deg)
     faces_one_way = _line_of(rest, segments, "hip") @ _line_of(rest, segments, "shoulder")
     up = _own_up(rest, segments)
-    if faces_one_way < np.cos(limit):
+    if faces_one_way < np.cos(_MAX_TILT):
         pass
-    elif _tilts(rest, segments, np.broadcast_to(_UP, (1, 3))).max() <= limit:
+    elif _tilts(rest, segments, np.broadcast_to(_UP, (1, 3))).max() <= _MAX_TILT:
         return skeleton
-    elif _tilts(rest, segments, up).max() <= limit:
+    elif _tilts(rest, segments, up).max() <= _MAX_TILT:
         axis = np.eye(3)[np.argmax(np.abs(up[0]))] * np.sign(up[0][np.argmax(np.abs(up[0]))])
         meant = axis if axis @ up[0] > np.cos(_NEAR_AXIS) else up[0]
         turn = rotations.between_vectors(meant, _UP)

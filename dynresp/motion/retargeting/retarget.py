@@ -1,15 +1,15 @@
 """From any person's skeleton to the character, with its feet on the floor.
 
-Each body of the character takes the turn of the source's segment away from the source's rest pose,
-after the two rest poses have been laid over each other (the sources rest with the arms out, the
-character with hanging arms). The root and the ankles keep the source's path, scaled by leg length,
-so that a foot that stands in the source stands here too although thigh and shank have other
-lengths. What then still hovers over the floor or sinks into it is set on it.
+Each body of the character takes the rotation of the source's segment away from the source's rest
+pose, after the two rest poses have been aligned (the sources rest with the arms out, the character
+with hanging arms). The root and the ankles keep the source's path, scaled by leg length, so that a
+foot that stands in the source stands here, too, although thigh and shank have other lengths. What
+is then still above the floor, or in it, is set on it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from dynresp.motion.feet import legs
 from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.readers.skeleton import SkeletonMotion
-from dynresp.motion.retargeting.floor import FloorConfig, find_floor, settle
+from dynresp.motion.retargeting.floor import find_floor, settle
 from dynresp.motion.retargeting.rest_pose import with_upright_rest
 from dynresp.motion.retargeting.segments import Segments, find_segments
 from dynresp.motion.rotations import FloatArray
@@ -39,40 +39,22 @@ _STANDING_SPEED = 0.4
 _STANDING_RISE = 0.04
 _STANDING_S = 0.1
 # In three quarters of that time it is within 12 degrees of how it stands on average (the cosine);
-# else its tips are no matter of calibration.
+# else how it tips has nothing to do with calibration.
 _STEADY = 0.978
 # A foot that stands tipped forward or backward by more than this [rad] is meant to: its heel is up.
 _HEEL_UP = np.radians(10.0)
 
 
-@dataclass(frozen=True)
-class RetargetConfig:
-    """How a source is laid onto the character.
-
-    Attributes:
-        flat_floor: Whether the source stood on level ground; if not (stairs, terrain,
-            playgrounds), where it mostly stands is put at height 0 and nothing else is moved.
-        rest_tilt_deg: A source whose trunk or legs lean further than this in its rest pose does not
-            rest upright; its rest pose is then turned, or told from its straightest frames.
-        floor: How it is set on the floor.
-    """
-
-    flat_floor: bool = True
-    rest_tilt_deg: float = 35.0
-    floor: FloorConfig = field(default_factory=FloorConfig)
-
-
 def retarget(
-    skeleton: SkeletonMotion,
-    character: Character | None = None,
-    config: RetargetConfig | None = None,
+    skeleton: SkeletonMotion, character: Character | None = None, *, flat_floor: bool = True
 ) -> Motion:
-    """Lay a skeleton's motion onto the character.
+    """Carry a skeleton's motion over to the character.
 
     Args:
         skeleton: The source.
         character: The character, by default the product's.
-        config: How to set it on the floor.
+        flat_floor: Whether the source stood on level ground; if not (stairs, terrain,
+            playgrounds), where it mostly stands is put at height 0 and nothing else is moved.
 
     Returns:
         A motion with the source's frames, rate and name, and foot contacts found.
@@ -81,14 +63,13 @@ def retarget(
         MotionError: The skeleton is not a person's.
     """
     character = character or default_character()
-    config = config or RetargetConfig()
     segments = find_segments(skeleton)
-    skeleton = with_upright_rest(skeleton, segments, config.rest_tilt_deg)
+    skeleton = with_upright_rest(skeleton, segments)
     poses, ankles = _follow(skeleton, segments, character)
     poses = legs.place_ankles(character, poses, ankles)
-    poses[:, 2] -= find_floor(character, poses, skeleton.fps, config.floor)
-    if config.flat_floor:
-        poses = settle(character, poses, skeleton.fps, config.floor)
+    poses[:, 2] -= find_floor(character, poses, skeleton.fps)
+    if flat_floor:
+        poses = settle(character, poses, skeleton.fps)
     states = character.kinematics(poses)
     contacts = foot_contacts(character, states, skeleton.fps)
     return Motion(poses, skeleton.fps, skeleton.name, contacts)

@@ -11,7 +11,6 @@ import os
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,41 +25,32 @@ if TYPE_CHECKING:
 _CONTENT_RANGE = re.compile(r"bytes (\d+)-\d+/(\d+|\*)")
 _TRANSIENT_STATUS = (408, 429)
 
-
-@dataclass(frozen=True, slots=True)
-class DownloadSettings:
-    """Time-outs and retries of a download.
-
-    Attributes:
-        attempts: Attempts at a file before giving up.
-        first_delay_s: Wait after the first failed attempt [s]; doubles with each further one.
-        longest_delay_s: Longest wait, also where the server asks for more [s].
-        connect_timeout_s: Longest wait for a connection [s].
-        read_timeout_s: Longest wait for the next bytes [s].
-        chunk_bytes: Bytes taken at a time.
-    """
-
-    attempts: int = 5
-    first_delay_s: float = 0.5
-    longest_delay_s: float = 30.0
-    connect_timeout_s: float = 10.0
-    read_timeout_s: float = 30.0
-    chunk_bytes: int = 16384
+# Attempts at a file before giving up.
+_ATTEMPTS = 5
+# Wait after the first failed attempt [s], which doubles with each further one; and the longest,
+# also where the server asks for more [s].
+_FIRST_DELAY_S = 0.5
+_LONGEST_DELAY_S = 30.0
+# Longest wait for a connection, and for the next bytes [s].
+_CONNECT_TIMEOUT_S = 10.0
+_READ_TIMEOUT_S = 30.0
+# Bytes taken at a time.
+_CHUNK_BYTES = 16384
 
 
 class FileRefusedError(FetchError):
-    """The server was reached, but has not this file, or not with the expected content."""
+    """The server answered, but does not have this file, or has other content than expected."""
 
 
 class _TransientError(Exception):
-    """An attempt failed in a way that may pass; `wait_s` is what the server asked for."""
+    """An attempt failed, but a later one may not; `wait_s` is the wait the server wants [s]."""
 
     def __init__(self, problem: str, wait_s: float = 0.0) -> None:
         super().__init__(problem)
         self.wait_s = wait_s
 
 
-def is_right(path: Path, source: SourceFile) -> bool:
+def matches(path: Path, source: SourceFile) -> bool:
     """Tell whether a file is there with the right size and SHA-256.
 
     Args:
@@ -85,7 +75,6 @@ def download(
     source: SourceFile,
     target: Path,
     report: Callable[[int], None],
-    settings: DownloadSettings,
 ) -> None:
     """Download a file beside its target, verify it and rename it.
 
@@ -95,23 +84,22 @@ def download(
         source: Its size and SHA-256; no more bytes than that are kept.
         target: Where it goes; folders are made, a file that is there is replaced.
         report: Called with the bytes that are there, at the start and as they arrive.
-        settings: Time-outs and retries.
 
     Raises:
-        FileRefusedError: The server has not the file, or not with this size and SHA-256.
+        FileRefusedError: The server does not have the file with this size and SHA-256.
         FetchError: The server cannot be reached or fails again and again, or the file cannot be
             written. What has arrived stays in the `.part` file, and is resumed.
     """
     import requests
 
     part = target.with_name(target.name + ".part")
-    delay_s = settings.first_delay_s
+    delay_s = _FIRST_DELAY_S
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _drop_unusable_part(part, source)
-        for attempt in range(1, settings.attempts + 1):
+        for attempt in range(1, _ATTEMPTS + 1):
             try:
-                _attempt(session, url, source, part, report, settings)
+                _attempt(session, url, source, part, report)
                 os.replace(part, target)
                 return
             except (
@@ -120,13 +108,13 @@ def download(
                 requests.exceptions.ChunkedEncodingError,
                 _TransientError,
             ) as error:
-                if attempt == settings.attempts:
+                if attempt == _ATTEMPTS:
                     raise FetchError(
                         f"{source.file} could not be fetched from {url} in {attempt} attempts: "
                         f"{error}. What has arrived is kept; fetch again to resume."
                     ) from error
-                asked_s = error.wait_s if isinstance(error, _TransientError) else 0.0
-            time.sleep(min(max(delay_s, asked_s), settings.longest_delay_s))
+                server_s = error.wait_s if isinstance(error, _TransientError) else 0.0
+            time.sleep(min(max(delay_s, server_s), _LONGEST_DELAY_S))
             delay_s *= 2
     except requests.RequestException as error:
         raise FetchError(f"{source.file} could not be fetched from {url}: {error}.") from error
@@ -144,7 +132,6 @@ def _attempt(
     source: SourceFile,
     part: Path,
     report: Callable[[int], None],
-    settings: DownloadSettings,
 ) -> None:
     """Bring the part file to its full length, from where it stands, and verify it."""
     start = part.stat().st_size if part.exists() else 0
@@ -154,12 +141,12 @@ def _attempt(
         headers = {"Accept-Encoding": "identity", "User-Agent": f"dynresp/{__version__}"}
         if start:
             headers["Range"] = f"bytes={start}-"
-        timeout = (settings.connect_timeout_s, settings.read_timeout_s)
+        timeout = (_CONNECT_TIMEOUT_S, _READ_TIMEOUT_S)
         with session.get(url, headers=headers, stream=True, timeout=timeout) as response:
             received = begin = _accepted_start(response, url, source, part, start)
             overlong = False
             with part.open("ab" if begin else "wb") as stream:
-                for chunk in response.iter_content(settings.chunk_bytes):
+                for chunk in response.iter_content(_CHUNK_BYTES):
                     overlong = received + len(chunk) > source.size
                     if overlong:
                         break
@@ -188,12 +175,12 @@ def _accepted_start(
 
     Returns:
         The offset in the file that its body begins at: `start`, or 0 where the server sends the
-        whole file although a range was asked for.
+        whole file although a range was requested.
     """
     status = response.status_code
     if status >= 500 or status in _TRANSIENT_STATUS:
-        asked = response.headers.get("Retry-After", "")
-        wait_s = float(asked) if asked.isdecimal() else 0.0
+        wanted = response.headers.get("Retry-After", "")
+        wait_s = float(wanted) if wanted.isdecimal() else 0.0
         raise _TransientError(f"the server answered {status}", wait_s)
     if status == 416 or (status == 206 and not _range_fits(response, source, start)):
         part.unlink(missing_ok=True)
@@ -212,7 +199,7 @@ def _accepted_start(
 
 
 def _range_fits(response: requests.Response, source: SourceFile, start: int) -> bool:
-    """Tell whether a partial answer begins where asked and is of a file of the right size."""
+    """Tell whether a partial answer begins where requested and is of a file of the right size."""
     match = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", ""))
     return match is not None and match[1] == str(start) and match[2] in ("*", str(source.size))
 

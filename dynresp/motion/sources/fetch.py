@@ -13,7 +13,7 @@ from urllib.parse import quote, urlsplit
 
 from dynresp.motion.sources.catalogue import Licence, SourceFile, licences_of
 from dynresp.motion.sources.collection import collection_files
-from dynresp.motion.sources.download import DownloadSettings, FileRefusedError, download, is_right
+from dynresp.motion.sources.download import FileRefusedError, download, matches
 from dynresp.motion.sources.motion_folders import fetched_folder
 from dynresp.support.errors import FetchError, UsageError
 
@@ -32,7 +32,7 @@ class FetchPlan:
 
     Attributes:
         folder: Motions folder that the files go to.
-        files: All files asked for.
+        files: All files of the collection.
         missing: Those of them that are not there yet, or not with the right content.
         licences: Licences that the files come under.
     """
@@ -95,7 +95,7 @@ def plan_fetch(
     chosen = collection_files(collection) if isinstance(collection, str) else collection
     files = tuple(chosen)
     folder = fetched_folder() if folder is None else folder
-    missing = tuple(source for source in files if not is_right(folder / source.file, source))
+    missing = tuple(source for source in files if not matches(folder / source.file, source))
     return FetchPlan(folder, files, missing, tuple(licences_of(files, licences)))
 
 
@@ -104,14 +104,13 @@ def fetch(
     *,
     base_url: str | None = None,
     progress: Callable[[FetchProgress], None] | None = None,
-    settings: DownloadSettings | None = None,
 ) -> None:
     """Fetch the missing files of a plan, one after the other.
 
-    What was interrupted, by Ctrl-C or by the network, lies in a `.part` file beside the target
-    and is resumed by the next call. A file gets its name only after its SHA-256 was verified.
-    A file that the server does not have, or has with other content, does not keep the others
-    from being fetched.
+    If Ctrl-C or the network interrupts a download, what has arrived stays in a `.part` file beside
+    the target, and the next call resumes it. A file gets its name only after its SHA-256 was
+    verified. If the server does not have a file, or has it with other content, the others are
+    still fetched.
 
     Args:
         plan: What `plan_fetch` found to be missing.
@@ -119,7 +118,6 @@ def fetch(
             else `DEFAULT_URL`. `{repo}`, `{commit}` and `{path}` in it are filled in; without
             `{path}` these three are appended.
         progress: Called at the start of each file and whenever bytes arrive.
-        settings: Time-outs and retries.
 
     Raises:
         UsageError: The address is not an http(s) address, or has unknown fields in braces.
@@ -128,7 +126,6 @@ def fetch(
     import requests
 
     template = _url_template(base_url)
-    settings = settings or DownloadSettings()
     refused: list[str] = []
     before = 0
     with requests.Session() as session:
@@ -136,7 +133,7 @@ def fetch(
             report = _reporter(progress, plan, number, before)
             url = file_url(template, source)
             try:
-                download(session, url, source, plan.folder / source.file, report, settings)
+                download(session, url, source, plan.folder / source.file, report)
             except FileRefusedError as error:
                 refused.append(str(error))
             before += source.size

@@ -9,10 +9,15 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.feet import legs
 from dynresp.motion.ground import clearances
 from dynresp.motion.motion import FEET
-from dynresp.motion.retargeting.floor import FloorConfig, find_floor, raise_above, settle
+from dynresp.motion.retargeting.floor import (
+    PULL_DOWN,
+    RAMP_S,
+    SINK,
+    find_floor,
+    raise_above,
+    settle,
+)
 from tests.motion.samples import bend_knees
-
-CONFIG = FloorConfig()
 
 
 def standing(character: Character, frames: int = 60, flexion: float = 0.3) -> np.ndarray:
@@ -82,7 +87,7 @@ class TestSettle:
         poses = standing(character)
         np.testing.assert_allclose(settle(character, poses, 30.0), poses, atol=1e-9)
 
-    @given(st.floats(-0.05, CONFIG.pull_down))
+    @given(st.floats(-0.05, PULL_DOWN))
     def test_sets_standing_feet_on_it(self, height: float) -> None:
         character = default_character()
         poses = standing(character, flexion=1.2)
@@ -112,7 +117,7 @@ class TestSettle:
         )[:, 2]
         np.testing.assert_allclose(shift[:40], -0.02, atol=1e-6)
         left = int(np.argmax(shift > -0.0199))
-        after = left + round(CONFIG.ramp_s * fps)
+        after = left + round(RAMP_S * fps)
         np.testing.assert_allclose(shift[after:], 0.0, atol=1e-6)
         assert np.abs(np.diff(shift)).max() < 0.006
 
@@ -127,7 +132,7 @@ class TestSettle:
                 poses[:, column : column + 4] = rotations.about_axis((0.0, 1.0, 0.0), angle)
         assert depth(character, poses, "others").min() < -0.1
         settled = settle(character, poses, 30.0)
-        assert depth(character, settled, "others").min() > -CONFIG.sink - 1e-3
+        assert depth(character, settled, "others").min() > -SINK - 1e-3
         np.testing.assert_allclose(settled[:, 2], poses[:, 2], atol=0.01)
 
     def test_lifts_who_lies_in_it(self, character: Character) -> None:
@@ -135,7 +140,7 @@ class TestSettle:
         poses[:, 3:7] = rotations.about_axis((0.0, 1.0, 0.0), -np.pi / 2.0)
         poses[:, 2] = 0.02
         settled = settle(character, poses, 30.0)
-        assert depth(character, settled, "others").min() > -CONFIG.sink - 1.5e-3
+        assert depth(character, settled, "others").min() > -SINK - 1.5e-3
         assert depth(character, settled, "feet").min() > -1e-9
 
     @pytest.mark.parametrize(
@@ -154,5 +159,5 @@ def test_raise_above_only_lifts(character: Character) -> None:
     poses = motion.poses.copy()
     poses[20:40, 2] -= 0.05
     lifted = raise_above(character, poses, motion.fps)
-    assert depth(character, lifted, "feet").min() > -CONFIG.sink - 1e-9
+    assert depth(character, lifted, "feet").min() > -SINK - 1e-9
     np.testing.assert_array_equal(lifted[60:], poses[60:])

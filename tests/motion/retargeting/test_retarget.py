@@ -16,7 +16,6 @@ from dynresp.motion.motion import FEET, Motion, interpolate, move_poses
 from dynresp.motion.readers import SkeletonMotion, read_motion_file
 from dynresp.motion.readers.bvh import read_bvh
 from dynresp.motion.retargeting.retarget import (
-    RetargetConfig,
     retarget,
     t_pose_frames,
     trim_t_poses,
@@ -322,7 +321,7 @@ class TestRealClips:
         for row in manifest[part::8]:
             uneven = row["file"].startswith(self.UNEVEN)
             skeleton = read_motion_file(motions_folder / row["file"])
-            motion = retarget(skeleton, character, RetargetConfig(flat_floor=not uneven))
+            motion = retarget(skeleton, character, flat_floor=not uneven)
             low = clearances(character, character.kinematics(motion.poses))
             if not uneven:
                 assert low[:, feet].min() > -0.001, row["file"]

@@ -12,17 +12,18 @@ from urllib.parse import unquote
 
 import pytest
 
+from dynresp.motion.sources import download
 from dynresp.motion.sources import download as download_module
 from dynresp.motion.sources import fetch as fetch_module
 from dynresp.motion.sources.catalogue import Licence, SourceFile
-from dynresp.motion.sources.download import DownloadSettings
 from dynresp.motion.sources.fetch import FetchPlan, FetchProgress, fetch, plan_fetch
 from dynresp.support.errors import DynrespError, FetchError, UsageError
 from dynresp.support.paths import CACHE_VARIABLE
 
 COMMIT = "c0ffee" + "0" * 34
 LICENCES = {"o/r": Licence("o/r", "MIT", "MIT License", "by o", "keep it", "http://o")}
-QUICK = DownloadSettings(first_delay_s=0.0, longest_delay_s=0.01, chunk_bytes=1000)
+FIRST_DELAY_S = download._FIRST_DELAY_S
+LONGEST_DELAY_S = download._LONGEST_DELAY_S
 BODY = bytes(range(256)) * 40  # 10,240 bytes
 
 
@@ -123,6 +124,14 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Server]:
     running.server_close()
 
 
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Waits that a test can bear, and small pieces."""
+    monkeypatch.setattr(download, "_FIRST_DELAY_S", 0.0)
+    monkeypatch.setattr(download, "_LONGEST_DELAY_S", 0.01)
+    monkeypatch.setattr(download, "_CHUNK_BYTES", 1000)
+
+
 def _publish(server: _Server, file: str = "d/a.bvh", body: bytes = BODY) -> SourceFile:
     original = f"Data/{Path(file).name}"
     server.files[f"/o/r/{COMMIT}/{original}"] = body
@@ -134,7 +143,7 @@ def _publish(server: _Server, file: str = "d/a.bvh", body: bytes = BODY) -> Sour
 
 def _fetch(server: _Server, folder: Path, *files: SourceFile, **options: object) -> FetchPlan:
     plan = plan_fetch(files, folder, LICENCES)
-    fetch(plan, **{"base_url": server.url, "settings": QUICK, **options})  # type: ignore[arg-type]
+    fetch(plan, **{"base_url": server.url, **options})  # type: ignore[arg-type]
     return plan
 
 
@@ -157,7 +166,7 @@ def test_files_come_with_progress_and_licences(server: _Server, tmp_path: Path) 
     assert (plan.missing, plan.missing_bytes) == (tuple(files), 15_240)
     assert plan.licences == (LICENCES["o/r"],)
     assert server.asked == [], "a plan must not use the network"
-    fetch(plan, base_url=server.url, progress=seen.append, settings=QUICK)
+    fetch(plan, base_url=server.url, progress=seen.append)
     assert (tmp_path / "d/a.bvh").read_bytes() == BODY
     assert (tmp_path / "e/f/b c#1.amc").read_bytes() == BODY[:5000]
     assert server.asked[1][0] == f"/o/r/{COMMIT}/Data/b%20c%231.amc"
@@ -278,9 +287,11 @@ def test_passing_failures_are_retried(
     server: _Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waits: list[float] = []
+    monkeypatch.setattr(download, "_FIRST_DELAY_S", FIRST_DELAY_S)
+    monkeypatch.setattr(download, "_LONGEST_DELAY_S", LONGEST_DELAY_S)
     monkeypatch.setattr(time, "sleep", waits.append)
     server.script = ["status 500", "status 502", "status 503", "status 429"]
-    _fetch(server, tmp_path, _publish(server), settings=DownloadSettings())
+    _fetch(server, tmp_path, _publish(server))
     _assert_only_file(tmp_path)
     assert waits == [0.5, 1.0, 30.0, 30.0], "doubled each time; a server may ask for 30 s at most"
 
@@ -294,10 +305,12 @@ def test_retries_end_and_stop_the_whole_fetch(server: _Server, tmp_path: Path) -
     assert (tmp_path / "d/a.bvh.part").read_bytes() == BODY[:3000]
 
 
-def test_server_that_falls_silent_is_left(server: _Server, tmp_path: Path) -> None:
+def test_server_that_falls_silent_is_left(
+    server: _Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     server.script = ["stall 5000"]
-    settings = DownloadSettings(first_delay_s=0, read_timeout_s=0.2, chunk_bytes=1000)
-    _fetch(server, tmp_path, _publish(server), settings=settings)
+    monkeypatch.setattr(download, "_READ_TIMEOUT_S", 0.2)
+    _fetch(server, tmp_path, _publish(server))
     _assert_only_file(tmp_path)
     assert server.ranges() == [None, "bytes=5000-"]
 
