@@ -14,7 +14,7 @@ from dynresp.avatar_runs.graph_building import build_graph as build_from_spec
 from dynresp.avatar_runs.graph_spec import find_plan, read_plan
 from dynresp.experiments.experiment_reader import read_experiment
 from dynresp.experiments.one_hit import HitResponse
-from dynresp.experiments.runner import Answer, Run, prepare_run, write_answers
+from dynresp.experiments.runner import HitResult, Run, prepare_run, write_results
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions
@@ -94,7 +94,7 @@ class ExperimentResult(Sequence[HitResponse]):
 
     responses: tuple[HitResponse, ...]
     _run: Run
-    _answers: tuple[Answer, ...]
+    _results: tuple[HitResult, ...]
 
     @overload
     def __getitem__(self, index: int) -> HitResponse: ...
@@ -125,7 +125,7 @@ class ExperimentResult(Sequence[HitResponse]):
         Raises:
             DynrespError: That file cannot be written.
         """
-        return write_answers(self._run, self._answers, Path(folder), progress)
+        return write_results(self._run, self._results, Path(folder), progress)
 
 
 def run(
@@ -154,8 +154,8 @@ def run(
     folder = None if motions is None else Path(motions)
     loaded = prepare_run(read_experiment(path), path.parent, folder, seed)
     table = loaded.experiment.experiment
-    answers = tuple(loaded.answers(range(table.count), progress))
-    about = loaded.about()
+    results = tuple(loaded.results(range(table.count), progress))
+    record = loaded.record()
     responses = tuple(
         HitResponse(
             motion=answer.response.motion,
@@ -164,9 +164,9 @@ def run(
             quality=answer.quality,
             title=table.name if table.count == 1 else f"{table.name}, hit {answer.hit.number}",
             _hit=answer.hit,
-            _about=about,
+            _record=record,
             _responder=loaded.responder,
         )
-        for answer in answers
+        for answer in results
     )
-    return ExperimentResult(responses, loaded, answers)
+    return ExperimentResult(responses, loaded, results)

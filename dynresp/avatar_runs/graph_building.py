@@ -16,7 +16,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import builtin_names
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
-from dynresp.motion.named_motion import BUILTIN_PREFIX, about_cut, find_motion, load_cut
+from dynresp.motion.named_motion import BUILTIN_PREFIX, cut_record, find_motion, load_cut
 from dynresp.motion.sources.motion_folders import (
     checked_relative_path,
     fits_pattern,
@@ -63,7 +63,7 @@ def build_graph(
         assert where is not None
         progress("loading motions", number, len(cuts))
         motions.append(load_cut(cut, where, f"motion {number + 1}", character))
-        about = about_cut(cut, where)
+        about = cut_record(cut, where)
         if "credit" in about:
             owed[about["credit"]] = None
     progress("finding contacts", 0, 1)

@@ -20,7 +20,7 @@ from dynresp.motion.motion import Motion
 from dynresp.motion.reactions.reaction_library import default_library
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball
-from dynresp.response.chooser import ChoiceTable, take_chooser
+from dynresp.response.chooser import ChoiceTable, make_chooser
 from dynresp.response.response import CARRY_ON, ResponseConfig
 from dynresp.response.runtime.dynamic_responder import Event, EventKind, Flight, Phase
 from dynresp.support.progress import Progress
@@ -63,7 +63,7 @@ def hit_outing(
     response = ResponseConfig()
     fps = response.physics.fps
     library = default_library(folders, character, fps)
-    choosing = take_chooser(ChoiceTable(), character, library, response, Path())
+    choosing = make_chooser(ChoiceTable(), character, library, response, Path())
     rng = np.random.default_rng(seed)
     start = int(rng.choice(graph.frames))
     crowd = AvatarCrowd(
@@ -103,7 +103,7 @@ def hit_outing(
         phases=watcher.phases(),
         about={
             "seed": seed,
-            "choice": choosing.about,
+            "choice": choosing.record,
             "returns": returns,
             "foot_skate_by_part_m": watcher.skates(motion, character),
         },

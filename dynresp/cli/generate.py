@@ -121,10 +121,10 @@ def _duration(seconds: float) -> str:
 
 def _warn(manifest: Mapping[str, Any]) -> None:
     """Say where built-in motions stand in for motion capture."""
-    from dynresp.cli.result_text import tell_substitutes
+    from dynresp.cli.result_text import substitutes_text
 
     for base in manifest["bases"]:
-        said = tell_substitutes({"base": base, "library": manifest["library"]})
+        said = substitutes_text({"base": base, "library": manifest["library"]})
         if said:
             typer.echo(f"dynresp: {said}", err=True)
             break

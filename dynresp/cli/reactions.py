@@ -36,11 +36,11 @@ def list_reactions(
     Without its motion capture on this machine, core is the built-in library.
     """
     from dynresp.motion.character import default_character
-    from dynresp.motion.reactions.named_library import about_library, take_library
+    from dynresp.motion.reactions.named_library import library_record, load_named_library
     from dynresp.motion.sources.motion_folders import motion_folders
 
-    found = take_library(library, motion_folders(motions), Path(), 30.0, default_character())
-    about = about_library(found, library)
+    found = load_named_library(library, motion_folders(motions), Path(), 30.0, default_character())
+    about = library_record(found, library)
     if as_json:
         rows = [
             {

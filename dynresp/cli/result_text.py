@@ -1,52 +1,108 @@
-"""Results in words, for people at a terminal."""
+"""Results in plain words, as `dynresp run` prints them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from dynresp.experiments.response_files import spoken
+from dynresp.experiments.response_files import reaction_title
 from dynresp.results.result_folder import RESULT, SUMMARY, TABLE, WRITTEN, hit_folder
 
+_BODIES = 14
+"""Bodies of the character, whose distances the mismatch sums."""
 
-def tell_result(content: dict[str, Any], out: Path) -> str:
-    """One response: what hit, what came of it, how good it is, and where it lies.
+
+def result_text(content: dict[str, Any], out: Path) -> str:
+    """One response: what hit, what came of it, how good it is, and where it was written.
 
     Args:
         content: Of `result.json`.
         out: Folder it was written to.
     """
     happened, quality = content["happened"], content["quality"]
-    lines = [content["experiment"], f"  base       {_motion(content['base'])}"]
+    lines = [("base motion", _motion(content["base"]))]
     if "contact" in happened:
         contact = happened["contact"]
-        body = contact["body"].replace("_", " ")
+        body, time_s = contact["body"].replace("_", " "), contact["time_s"]
+        in_base_s = content["motion"]["starts_in_base_at_s"] + time_s
         lines.append(
-            f"  contact    {body}, {contact['force_n']:.0f} N, at {contact['time_s']:.2f} s"
+            (
+                "contact",
+                f"{body}, {contact['force_n']:.0f} N, at {time_s:.2f} s; "
+                f"{_base_clocks(in_base_s, content['base'])}",
+            )
         )
-    lines.append(f"  outcome    {_outcome(happened)}, chosen by {_chooser(content['choosing'])}")
+    lines.append(("outcome", _outcome(happened)))
+    if happened["outcome"] in ("reaction", "carry on"):
+        lines.append(("chosen by", _chooser(content["choosing"])))
     if "alignment" in happened:
-        at = happened["alignment"]
-        lines.append(
-            f"  alignment  left {at['exit_after_contact_s']:.2f} s after contact, entered at "
-            f"{at['entry_time_in_clip_s']:.2f} s of the clip, error {happened['error_m']:.2f} m"
-        )
+        lines += _transition(happened, content)
     if quality:
-        lines += [
-            f"  physics    {quality['physics_s']:.2f} s",
-            f"  seams      joint speed step {quality['speed_step_ratio']:.2f} of the clip's own, "
-            f"root jump {100 * quality['root_jump_m']:.2f} cm, {quality['root_jump_deg']:.2f} deg, "
-            f"shake {100 * quality['root_shake_m']:.2f} cm, {quality['root_shake_deg']:.2f} deg",
-            f"  ground     foot {100 * quality['foot_depth_m']:.1f} cm deep, body "
-            f"{100 * quality['body_depth_m']:.1f} cm, skate {100 * quality['foot_skate_m']:.1f} cm",
-        ]
+        lines += _quality(quality)
     written = [name for name, what in content["files"].items() if what == WRITTEN]
-    lines.append(f"  written    {out}: {', '.join([RESULT, *written])}")
-    return "\n".join(lines)
+    lines.append(("written", f"{out}: {', '.join([RESULT, *written])}"))
+    return "\n".join([content["experiment"], *(_line(*line) for line in lines)])
 
 
-def tell_summary(content: dict[str, Any], out: Path) -> str:
-    """A batch: outcomes, choices, figures and targets.
+def _line(name: str, text: str) -> str:
+    return f"  {name:<12} {text}"
+
+
+def _transition(happened: dict[str, Any], content: dict[str, Any]) -> list[tuple[str, str]]:
+    """Where physics ends, where the reaction begins, what joins them, and how well they match."""
+    at = happened["alignment"]
+    entry_s, exit_s, end_s = (
+        at["entry_time_in_clip_s"],
+        at["exit_time_s"],
+        at["blend_end_time_s"],
+    )
+    if happened["outcome"] == "carry on":
+        entry = f"back into the base motion, {_base_clocks(entry_s, content['base'])}"
+    elif "entry_time_in_file_s" in at:
+        in_file_s = at["entry_time_in_file_s"]
+        entry = f"into the reaction at {entry_s:.2f} s of its clip ({in_file_s:.2f} s of its file)"
+    else:
+        entry = f"into the reaction at {entry_s:.2f} s of its clip"
+    window_s = content["settings"]["window_s"]
+    return [
+        (
+            "exit",
+            f"out of the simulation {at['exit_after_contact_s']:.2f} s after contact, "
+            f"at {exit_s:.2f} s",
+        ),
+        ("entry", entry),
+        ("blend", f"joins the two from {exit_s:.2f} to {end_s:.2f} s"),
+        (
+            "mismatch",
+            f"{happened['error_m']:.2f} m: how far simulation and "
+            f"{'base motion' if happened['outcome'] == 'carry on' else 'reaction'} are apart, "
+            f"summed over {_BODIES} bodies, averaged over {window_s:.2f} s",
+        ),
+    ]
+
+
+def _quality(quality: dict[str, Any]) -> list[tuple[str, str]]:
+    """The metrics of `docs/quality.md` in words."""
+    return [
+        ("physics", f"{quality['physics_s']:.2f} s from contact to the end of the blend"),
+        (
+            "seams",
+            f"joint speed changes {quality['speed_step_ratio']:.2f} times as hard as in the "
+            f"recording; root jumps {100 * quality['root_jump_m']:.2f} cm and "
+            f"{quality['root_jump_deg']:.2f} deg, shakes {100 * quality['root_shake_m']:.2f} cm "
+            f"and {quality['root_shake_deg']:.2f} deg",
+        ),
+        (
+            "ground",
+            f"feet at most {100 * quality['foot_depth_m']:.1f} cm in the floor, other bodies "
+            f"{100 * quality['body_depth_m']:.1f} cm; standing feet slide "
+            f"{100 * quality['foot_skate_m']:.1f} cm",
+        ),
+    ]
+
+
+def summary_text(content: dict[str, Any], out: Path) -> str:
+    """A batch: outcomes, choices and metrics.
 
     Args:
         content: Of `summary.json`.
@@ -55,31 +111,27 @@ def tell_summary(content: dict[str, Any], out: Path) -> str:
     outcomes = ", ".join(f"{n} {name}" for name, n in content["outcomes"].items() if n)
     lines = [
         content["experiment"],
-        f"  base       {_motion(content['base'])}",
-        f"  outcomes   {outcomes}",
+        _line("base motion", _motion(content["base"])),
+        _line("outcomes", outcomes),
     ]
     if content["choices"]:
         choices = ", ".join(f"{n} {name}" for name, n in content["choices"].items())
-        lines.append(f"  choices    {choices}")
-    if content["figures"]:
-        lines.append(f"  {'figure':<22}{'median':>10}{'95 %':>10}{'largest':>10}")
-        for name, figure in content["figures"].items():
-            numbers = "".join(f"{figure[key]:>10.4g}" for key in ("p50", "p95", "max"))
+        lines.append(_line("choices", choices))
+    lines.append(_line("chosen by", _chooser(content["choosing"])))
+    if content["metrics"]:
+        lines.append(f"  {'metric':<22}{'median':>10}{'95 %':>10}{'largest':>10}")
+        for name, metric in content["metrics"].items():
+            numbers = "".join(f"{metric[key]:>10.4g}" for key in ("p50", "p95", "max"))
             lines.append(f"  {name:<22}{numbers}")
-    for target in content["targets"]:
-        lines.append(
-            f"  {'met   ' if target['met'] else 'MISSED'} {target['figure']} at most "
-            f"{target['limit']:g} in {target['share_within']:.1%} "
-            f"(wanted {target['share_wanted']:.0%})"
-        )
+        lines.append(_line("", "95 % of the responses are at or below the second number."))
     table = [name for name in (TABLE,) if content["files"][name] == WRITTEN]
     shown = [hit_folder(number) for number in content["shown"]]
-    lines.append(f"  written    {out}: {', '.join([SUMMARY, *table, *shown])}")
+    lines.append(_line("written", f"{out}: {', '.join([SUMMARY, *table, *shown])}"))
     return "\n".join(lines)
 
 
-def tell_substitutes(content: dict[str, Any]) -> str | None:
-    """That built-in motions stand in for motion capture, or None where they do not.
+def substitutes_text(content: dict[str, Any]) -> str | None:
+    """That built-in motions take the place of motion capture, or None where they do not.
 
     Args:
         content: Of `result.json` or `summary.json`.
@@ -89,51 +141,65 @@ def tell_substitutes(content: dict[str, Any]) -> str | None:
     if not missing:
         return None
     return (
-        f"built-in motions stand in for motion capture that is not on this machine "
+        f"built-in motions take the place of motion capture that is not on this machine "
         f"({', '.join(missing)}); `dynresp motions fetch core` gets it"
     )
 
 
-def tell_choosing(content: dict[str, Any]) -> str | None:
-    """What there is to know about how it was chosen, or None if nothing is.
+def choice_text(content: dict[str, Any]) -> str | None:
+    """What the user should know about the choice, or None if nothing is unusual.
 
     Args:
         content: Of `result.json` or `summary.json`.
     """
-    about = content["choosing"]
-    if "passed_over" in about:
+    record = content["choosing"]
+    if "passed_over" in record:
+        return f"your own classifier for this library cannot be used: {record['passed_over']}"
+    if "instead_of" in record:
         return (
-            f"the classifier kept for this library cannot be used, and was passed over: "
-            f"{about['passed_over']}"
+            "the full search (oracle) chose, because this machine has no classifier for the "
+            f"library {content['library']['name']}; `dynresp generate` and `dynresp train` make "
+            "one (docs/learning.md)"
         )
-    if "instead_of" in about:
-        return (
-            f"the oracle chose: there is no classifier for the library {content['library']['name']}"
-            " on this machine; `dynresp generate` and `dynresp train` make one (docs/learning.md)"
-        )
-    differing = about.get("classifier", {}).get("other_settings")
+    differing = record.get("classifier", {}).get("other_settings")
     if differing:
-        return f"the classifier was trained with other settings: {', '.join(differing)}"
+        return (
+            f"the classifier was trained with other settings ({', '.join(differing)}), so it may "
+            "choose less well"
+        )
     return None
 
 
-def _motion(about: dict[str, Any]) -> str:
-    name = about["motion"]
-    return f"{name}, for want of {about['instead_of']}" if "instead_of" in about else str(name)
+def _motion(record: dict[str, Any]) -> str:
+    name = str(record["motion"])
+    return f"{name}, in place of {record['instead_of']}" if "instead_of" in record else name
 
 
-def _chooser(about: dict[str, Any]) -> str:
-    if "classifier" not in about:
-        return "the oracle"
-    return f"a classifier trained on {about['classifier']['trained_on']} samples"
+def _base_clocks(time_s: float, base: dict[str, Any]) -> str:
+    """A time in the base motion, and in its file where the experiment cuts it.
+
+    Where T-poses were cut off, too, the time in the file is not known.
+    """
+    text = f"{time_s:.2f} s of the base motion"
+    if not base.get("start_s") or base.get("trim_t_pose"):
+        return text
+    return f"{text} ({base['start_s'] + time_s:.2f} s of its file)"
+
+
+def _chooser(record: dict[str, Any]) -> str:
+    if "classifier" not in record:
+        return "the full search (oracle): compares all reactions"
+    samples = record["classifier"]["trained_on"]
+    return f"the classifier, trained on {samples:,} hits; budget {record['budget']}"
 
 
 def _outcome(happened: dict[str, Any]) -> str:
     what = happened["outcome"]
     if what == "reaction":
-        return f"reaction {spoken(happened['choice'])}"
+        return f"reaction: {reaction_title(happened['choice'])}"
     if what == "diverged":
-        return f"diverged ({happened['diverged']['warning']})"
+        return f"the simulation diverged ({happened['diverged']['warning']})"
     if what == "miss":
-        return "missed; the base motion goes on"
-    return "carries on with the base motion" + (", grazed" if happened["graze"] else "")
+        return "miss: nothing was hit, and the base motion goes on"
+    why = "the hit is too light for a reaction" if happened["graze"] else "it fits best"
+    return f"no reaction (carry on): the base motion goes on; {why}"

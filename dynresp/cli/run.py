@@ -53,7 +53,7 @@ def answer(
         experiment: The file.
         out: Folder for the results.
         motions: Motions folder that the user named.
-        seed: Taken instead of the file's own.
+        seed: Used instead of the file's own.
         as_json: Print `result.json` or `summary.json` instead of text.
         choice: Keys of `[choice]` that are taken instead of the file's own.
 
@@ -62,7 +62,7 @@ def answer(
             a video on a machine that cannot draw is none.
         DynrespError: It could not be done.
     """
-    from dynresp.cli.result_text import tell_choosing, tell_result, tell_substitutes, tell_summary
+    from dynresp.cli.result_text import choice_text, result_text, substitutes_text, summary_text
     from dynresp.experiments.experiment_reader import read_experiment
     from dynresp.results.result_json import to_json
 
@@ -74,16 +74,16 @@ def answer(
 
         loaded = prepare_run(file, experiment.parent, motions, seed, choice=choice)
         content = run_experiment(loaded, out, tell)
-    for remark in (tell_substitutes(content), tell_choosing(content)):
+    for remark in (substitutes_text(content), choice_text(content)):
         if remark:
             typer.echo(f"dynresp: {remark}", err=True)
     report_unwritten(content["files"])
     if as_json:
         typer.echo(to_json(content))
     elif "outcomes" in content:
-        typer.echo(tell_summary(content, out))
+        typer.echo(summary_text(content, out))
     else:
-        typer.echo(tell_result(content, out))
+        typer.echo(result_text(content, out))
     if _all_diverged(content):
         typer.echo("dynresp: the simulation diverged; see result.json", err=True)
         raise typer.Exit(1)

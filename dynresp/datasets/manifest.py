@@ -12,11 +12,11 @@ from typing import Any
 from dynresp.datasets.dataset_spec import KINDS, DatasetPlan, plain
 from dynresp.datasets.shard_schema import PARAMETERS, SCHEMA_VERSION
 from dynresp.motion.character import Character
-from dynresp.motion.named_motion import Taken
-from dynresp.motion.reactions.named_library import about_library
+from dynresp.motion.named_motion import NamedMotion
+from dynresp.motion.reactions.named_library import library_record
 from dynresp.motion.reactions.reaction_library import MIRRORED, ReactionLibrary
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.response.response_settings import in_force
+from dynresp.response.response_settings import settings_record
 from dynresp.results.result_json import versions
 from dynresp.support.files import replacing
 
@@ -31,7 +31,7 @@ def make_manifest(
     plan: DatasetPlan,
     shard_size: int,
     character: Character,
-    bases: Sequence[Taken],
+    bases: Sequence[NamedMotion],
     library: ReactionLibrary,
     config: ResponseConfig,
     classes: Sequence[str],
@@ -46,12 +46,12 @@ def make_manifest(
         "shard_size": shard_size,
         "plan": plain(plan),
         "bases": [
-            {"name": base.title, **taken.about, **_motion(taken)}
+            {"name": base.title, **taken.record, **_motion(taken)}
             for base, taken in zip(plan.base, bases, strict=True)
         ],
-        "library": about_library(library, plan.library.which),
+        "library": library_record(library, plan.library.which),
         "character": {"identity": character.identity, "bodies": list(character.body_names)},
-        "settings": in_force(config),
+        "settings": settings_record(config),
         "classes": _classes(classes, library),
         "features": list(feature_names),
         "parameters": list(PARAMETERS),
@@ -64,7 +64,7 @@ def make_manifest(
     return {**content, "identity": identity_of(content)}
 
 
-def _motion(taken: Taken) -> dict[str, Any]:
+def _motion(taken: NamedMotion) -> dict[str, Any]:
     motion = taken.motion
     # Rounded, since the last digits may differ from machine to machine; 0.0 takes away -0.
     poses = (motion.poses.round(4) + 0.0).astype("<f8")

@@ -29,7 +29,7 @@ class Sample:
         base: Which `[[base]]` of the plan is hit, from 0.
         table: Which `[[impact]]` of the plan it was drawn from, from 0.
         phase: When, as a share of the time at which it can come.
-        asked: The impact's keys and the values drawn; units stand in the keys.
+        values: The impact's keys and the values drawn; units stand in the keys.
         impact: The same for the simulation.
     """
 
@@ -37,7 +37,7 @@ class Sample:
     base: int
     table: int
     phase: float
-    asked: dict[str, Any]
+    values: dict[str, Any]
     impact: Impact
 
 
@@ -57,12 +57,12 @@ def draw_sample(plan: DatasetPlan, durations: Sequence[float], index: int) -> Sa
     planned = plan.impact[table]
     phase = float(draw(planned.phase, rng))
     keys = [key for key in type(planned.hit).model_fields if key != "time_s"]
-    asked = {key: draw(getattr(planned.hit, key), rng) for key in keys}
-    lead = lead_s(asked.get("radius_m", 0.0), asked.get("speed_m_s"))
-    asked["time_s"] = lead + phase * (durations[base] - GOES_ON_S - lead)
+    values = {key: draw(getattr(planned.hit, key), rng) for key in keys}
+    lead = lead_s(values.get("radius_m", 0.0), values.get("speed_m_s"))
+    values["time_s"] = lead + phase * (durations[base] - GOES_ON_S - lead)
     # With all its values drawn, the table is that of an experiment of one hit.
-    (hit,) = draw_hits(planned.hit.model_copy(update=asked), 0, range(1))
-    return Sample(index, base, table, phase, asked, hit.impact)
+    (hit,) = draw_hits(planned.hit.model_copy(update=values), 0, range(1))
+    return Sample(index, base, table, phase, values, hit.impact)
 
 
 def _pick(weights: Sequence[float], rng: np.random.Generator) -> int:

@@ -13,8 +13,8 @@ from dynresp.datasets.sample_draws import check_durations, draw_sample
 from dynresp.datasets.shard_schema import columns, drawn, joined, labelled
 from dynresp.datasets.shards import Place, encode
 from dynresp.motion.character import default_character
-from dynresp.motion.named_motion import take_motion
-from dynresp.motion.reactions.named_library import take_library
+from dynresp.motion.named_motion import load_spec_motion
+from dynresp.motion.reactions.named_library import load_named_library
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.response.response_settings import response_config
 from dynresp.support.errors import DynrespError, MotionError, SpecError
@@ -68,7 +68,7 @@ class Workshop:
         folders, fps = motion_folders(motions), self._config.physics.fps
         several = len(plan.base) > 1
         self._bases = [
-            take_motion(
+            load_spec_motion(
                 base,
                 base.otherwise,
                 f"base {number}" if several else "base",
@@ -81,7 +81,9 @@ class Workshop:
         ]
         self._durations = [base.motion.duration for base in self._bases]
         check_durations(plan, self._durations)
-        self._library = take_library(plan.library.which, folders, beside, fps, self._character)
+        self._library = load_named_library(
+            plan.library.which, folders, beside, fps, self._character
+        )
         self._outcomes = OUTCOMES
         try:
             self._labeller = Labeller(self._character, self._library, self._config, threads=1)

@@ -113,11 +113,11 @@ def drawn(samples: Sequence[Sample], character: Character) -> Columns:
         "index": np.array([s.index for s in samples], dtype="<i8"),
         "base": np.array([s.base for s in samples], dtype="<i2"),
         "impact": np.array([s.table for s in samples], dtype="<i2"),
-        "kind": np.array([KINDS.index(s.asked["kind"]) for s in samples], dtype="|i1"),
-        "target": np.array([character.body(s.asked["target"]) for s in samples], dtype="|i1"),
+        "kind": np.array([KINDS.index(s.values["kind"]) for s in samples], dtype="|i1"),
+        "target": np.array([character.body(s.values["target"]) for s in samples], dtype="|i1"),
     }
     for name in PARAMETERS:
-        asked = [s.phase if name == "phase" else s.asked.get(name) for s in samples]
+        asked = [s.phase if name == "phase" else s.values.get(name) for s in samples]
         found[name] = np.array([np.nan if v is None else v for v in asked], dtype="<f8")
     return found
 

@@ -1,11 +1,11 @@
-"""What is said of many responses: a row for each, and how good they are together."""
+"""The table and the summary of a batch: a row for each hit, and metrics over all of them."""
 
 from __future__ import annotations
 
 import csv
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,44 +17,13 @@ from dynresp.response.response import Response
 from dynresp.response.response_quality import Quality
 from dynresp.support.files import replacing
 
-FIGURES = tuple(item.name for item in fields(Quality))
-"""Names of the quality figures."""
-
-
-@dataclass(frozen=True)
-class Target:
-    """What a figure shall reach.
-
-    Attributes:
-        figure: Its name.
-        limit: It shall be at most this.
-        share: In at least this share of the responses.
-    """
-
-    figure: str
-    limit: float
-    share: float
-
-
-TARGETS = (
-    Target("speed_step_ratio", 1.5, 0.95),
-    Target("root_jump_m", 0.01, 0.95),
-    Target("root_jump_deg", 1.0, 0.95),
-    Target("root_shake_m", 0.01, 0.95),
-    Target("root_shake_deg", 1.0, 0.95),
-    Target("foot_skate_blend_m", 0.02, 1.0),
-    Target("foot_depth_m", 0.02, 0.95),
-    Target("body_depth_m", 0.04, 0.95),
-    # A share of one half: the median. Wholly under physics, and until the blend has ended.
-    Target("free_physics_s", 0.5, 0.5),
-    Target("physics_s", 0.5, 0.5),
-)
-"""What responses shall reach; `docs/quality.md` explains the figures."""
+METRICS = tuple(item.name for item in fields(Quality))
+"""Names of the quality metrics; `docs/quality.md` explains them."""
 
 
 def row(hit: Hit, response: Response, quality: Quality | None) -> dict[str, Any]:
-    """One response as a row of the table; what it has not is left out."""
-    cells: dict[str, Any] = {"hit": hit.number, **hit.asked, "outcome": outcome(response)}
+    """One response as a row of the table, without the cells that it does not have."""
+    cells: dict[str, Any] = {"hit": hit.number, **hit.values, "outcome": outcome(response)}
     if response.contact is not None:
         cells["body"] = response.contact.body
         cells["force_n"] = response.contact.force
@@ -74,7 +43,7 @@ def row(hit: Hit, response: Response, quality: Quality | None) -> dict[str, Any]
 
 
 def write_table(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Write rows as CSV, empty where a row has no such cell.
+    """Write rows as CSV; a cell that a row does not have stays empty.
 
     Raises:
         DynrespError: The file cannot be written.
@@ -89,39 +58,29 @@ def write_table(rows: Sequence[dict[str, Any]], path: Path) -> None:
 
 
 def summarise(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Outcomes, choices, and the figures of all responses together.
+    """Outcomes, choices, and the metrics of all responses together.
+
+    Args:
+        rows: Of the table.
 
     Returns:
-        `outcomes` and `choices` count; `figures` gives the median, the 95th percentile and the
-        largest of each figure over the responses that have it; `targets` says for each target the
-        share of those responses that are within it; `diverged` lists the hits that diverged, with
-        all that was asked of them.
+        `outcomes` and `choices` count; `metrics` gives the median, the 95th percentile and the
+        largest of each metric over the responses that have it; `diverged` lists the rows of the
+        hits whose simulation diverged.
     """
-    measured = [cells for cells in rows if FIGURES[0] in cells]
+    measured = [cells for cells in rows if METRICS[0] in cells]
     outcomes = Counter(cells["outcome"] for cells in rows)
     choices = Counter(cells["choice"] for cells in rows if "choice" in cells)
-    figures: dict[str, Any] = {}
-    for name in FIGURES if measured else ():
+    metrics: dict[str, Any] = {}
+    for name in METRICS if measured else ():
         values = np.array([cells[name] for cells in measured])
         p50, p95 = (float(np.percentile(values, p)) for p in (50, 95))
-        figures[name] = {"p50": p50, "p95": p95, "max": float(values.max())}
+        metrics[name] = {"p50": p50, "p95": p95, "max": float(values.max())}
     return {
         "responses": len(rows),
         "measured": len(measured),
         "outcomes": {name: outcomes[name] for name in OUTCOMES},
         "choices": dict(sorted(choices.items(), key=lambda item: (-item[1], item[0]))),
-        "figures": figures,
-        "targets": [_judge(target, measured) for target in TARGETS] if measured else [],
+        "metrics": metrics,
         "diverged": [cells for cells in rows if cells["outcome"] == "diverged"],
-    }
-
-
-def _judge(target: Target, measured: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    within = float(np.mean([cells[target.figure] <= target.limit for cells in measured]))
-    return {
-        "figure": target.figure,
-        "limit": target.limit,
-        "share_wanted": target.share,
-        "share_within": within,
-        "met": within >= target.share,
     }

@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any, get_args
 from dynresp.experiments.experiment_spec import OutputTable
 from dynresp.experiments.response_files import write_response
 from dynresp.experiments.response_record import outcome
-from dynresp.experiments.response_story import show as story_of
+from dynresp.experiments.response_story import response_story
 from dynresp.motion.motion import Motion
 from dynresp.motion.named_motion import load_named_motion
-from dynresp.motion.reactions.named_library import about_library, take_library
+from dynresp.motion.reactions.named_library import library_record, load_named_library
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.physics.drawn_hits import Hit
 from dynresp.physics.impacts import Ball, Impact, Push, Strike
 from dynresp.response.budget import BUDGETS, Budget
-from dynresp.response.chooser import ChoiceTable, take_chooser
+from dynresp.response.chooser import ChoiceTable, make_chooser
 from dynresp.response.responder import Responder
 from dynresp.response.response import Response
 from dynresp.response.response_quality import Quality, measure
-from dynresp.response.response_settings import in_force
+from dynresp.response.response_settings import settings_record
 from dynresp.results.result_folder import Artefact
 from dynresp.results.result_json import versions
 from dynresp.support.errors import SimulationError, UnknownNameError, UsageError
@@ -70,7 +70,7 @@ class HitResponse:
     quality: Quality | None
     title: str
     _hit: Hit
-    _about: dict[str, Any]
+    _record: dict[str, Any]
     _responder: Responder
 
     @property
@@ -128,10 +128,9 @@ class HitResponse:
             self._hit,
             self.response,
             self.quality,
-            self._about,
+            self._record,
             output,
-            self._responder.character,
-            self._responder.config,
+            self._responder,
             progress,
         )
 
@@ -145,7 +144,7 @@ class HitResponse:
         from dynresp.view.recording import write_recording
 
         lead_in_s = OutputTable().lead_in_s
-        shown = story_of(self.response, self.impact, lead_in_s, self.title, self.outcome)
+        shown = response_story(self.response, self.impact, lead_in_s, self.title, self.outcome)
         path = Path(tempfile.mkdtemp(prefix="dynresp-")) / "recording.html"
         write_recording(shown.story, path)
         webbrowser.open(path.as_uri())
@@ -199,7 +198,7 @@ def hit(
         raise UnknownNameError("budget", budget, BUDGETS)
     if not isinstance(library, ReactionLibrary):
         library = str(library)
-    responder, about = _responder(library, budget, None if motions is None else Path(motions))
+    responder, record = _responder(library, budget, None if motions is None else Path(motions))
     fps = responder.config.physics.fps
     base: dict[str, Any] = {}
     if isinstance(motion, Motion):
@@ -220,8 +219,8 @@ def hit(
         response=response,
         quality=measure(response, responder.character),
         title=f"A {kind} on {base['motion'] or 'a motion'}",
-        _hit=Hit(0, _asked(kind, impact), impact),
-        _about={"experiment": f"{kind} on {base['motion']}", "count": 1, "base": base, **about},
+        _hit=Hit(0, _values(kind, impact), impact),
+        _record={"experiment": f"{kind} on {base['motion']}", "count": 1, "base": base, **record},
         _responder=responder,
     )
 
@@ -238,20 +237,20 @@ def _responder(
     which = library if isinstance(library, str) else library.name
     if isinstance(library, str):
         folders = motion_folders(motions)
-        library = take_library(library, folders, Path(), config.physics.fps, character)
+        library = load_named_library(library, folders, Path(), config.physics.fps, character)
     table = ChoiceTable.model_validate({"budget": budget})
-    choosing = take_chooser(table, character, library, config, Path())
-    about = {
-        "library": about_library(library, which),
-        "choosing": choosing.about,
-        "settings": in_force(config),
+    choosing = make_chooser(table, character, library, config, Path())
+    record = {
+        "library": library_record(library, which),
+        "choosing": choosing.record,
+        "settings": settings_record(config),
         "character": character.identity,
         "versions": versions(),
     }
-    return Responder(character, library, config, chooser=choosing.chooser), about
+    return Responder(character, library, config, chooser=choosing.chooser), record
 
 
-def _asked(kind: str, impact: Impact) -> dict[str, Any]:
+def _values(kind: str, impact: Impact) -> dict[str, Any]:
     """The numbers of an impact for `result.json`, units in their keys."""
     numbers = {item.name: getattr(impact, item.name) for item in fields(impact)}
     numbers.pop("motion", None)

@@ -1,4 +1,4 @@
-"""Writing what a response is to a folder: motion, recording, pictures, video and `result.json`."""
+"""Writing a response to its folder: motion, recording, pictures, video and `result.json`."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any, get_args
 
 from dynresp.experiments.experiment_spec import OutputTable
 from dynresp.experiments.response_record import describe, outcome
-from dynresp.experiments.response_story import show
+from dynresp.experiments.response_story import response_story
 from dynresp.motion.builtin import PREFIX
-from dynresp.motion.character import Character
 from dynresp.physics.drawn_hits import Hit
 from dynresp.physics.impacts import Strike
 from dynresp.response.alignment.error_surface import landscape
-from dynresp.response.response import Response, ResponseConfig
+from dynresp.response.responder import Responder
+from dynresp.response.response import Response
 from dynresp.response.response_quality import Quality
 from dynresp.results.result_folder import (
     RESULT,
@@ -33,10 +33,9 @@ def write_response(
     hit: Hit,
     response: Response,
     quality: Quality | None,
-    about: dict[str, Any],
+    record: dict[str, Any],
     output: OutputTable,
-    character: Character,
-    config: ResponseConfig,
+    responder: Responder,
     progress: Progress,
 ) -> dict[str, Any]:
     """Write one response to a folder.
@@ -47,51 +46,48 @@ def write_response(
     Args:
         folder: Where to; made if it is missing.
         title: First line of the pictures.
-        hit: What was asked.
+        hit: The hit.
         response: What came of it.
-        quality: Its figures.
-        about: What `result.json` says about the whole experiment.
+        quality: Its metrics.
+        record: What `result.json` says about the whole experiment.
         output: What to write.
-        character: The character.
-        config: Settings by which it was made.
-        progress: Told the stage, how many are done, and of how many.
+        responder: What made the response.
+        progress: Called with the stage, how many steps are done, and of how many.
 
     Returns:
-        The content of `result.json`, which is written whatever becomes of the others; under
-        `files` it says what was written, and why not where something was asked for and is not
-        there.
+        The content of `result.json`, which is written even if other files fail; under `files` it
+        says for each file whether it was written, and if not, why.
 
     Raises:
         DynrespError: `result.json` cannot be written.
     """
-    shown = show(response, hit.impact, output.lead_in_s, title, _subtitle(hit, response))
-    story = shown.story
+    shown = response_story(response, hit.impact, output.lead_in_s, title, _subtitle(hit, response))
+    story, character = shown.story, responder.character
     writers = {
         **story_writers(story, character, output.video_size_px, output.video_fps, progress),
-        "alignment.png": lambda path: _write_alignment(path, response, title, character, config),
+        "alignment.png": lambda path: _write_alignment(path, response, title, responder),
     }
     names = [name for name in get_args(Artefact) if name in output.write]
     files = write_files(folder, names, writers, progress)
     there = [name for name, what in files.items() if what == WRITTEN]
     left = clear_response(folder, [RESULT, *there])
     files |= {name: what for name, what in left.items() if name not in files}
-    content = {**about, **describe(hit, response, quality, shown), "files": files}
+    described = describe(hit, response, quality, shown, responder.library)
+    content = {**record, **described, "files": files}
     write_json(content, folder / RESULT)
     progress(f"writing {RESULT}", len(names), len(names))
     return content
 
 
-def _write_alignment(
-    path: Path, response: Response, title: str, character: Character, config: ResponseConfig
-) -> None:
-    """The errors among which the choice was aligned."""
+def _write_alignment(path: Path, response: Response, title: str, responder: Responder) -> None:
+    """Plot the mismatch of the choice over all exits and entries."""
     from dynresp.view.response_plots import RankedReaction, write_alignment
 
     if response.exit is None or response.contact_frame is None or response.choice is None:
         raise NothingToShowError(f"the outcome is a {outcome(response)}, so nothing was aligned")
     assert response.entry is not None
     fps = response.motion.fps
-    found = landscape(response, character, config)
+    found = landscape(response, responder.character, responder.config)
     ranking = [RankedReaction(name, error) for name, error in response.errors.items()]
     write_alignment(
         path,
@@ -100,7 +96,7 @@ def _write_alignment(
         found.entries_s,
         (response.exit - response.contact_frame) / fps,
         response.entry / fps,
-        title=f"{title}: {spoken(response.choice)}",
+        title=f"{title}: {reaction_title(response.choice)}",
         unit="m",
         # One reaction beside the base motion is no ranking.
         ranking=ranking if len(ranking) > 2 else [],
@@ -110,21 +106,21 @@ def _write_alignment(
 
 def _subtitle(hit: Hit, response: Response) -> str:
     """The hit and what came of it in a line."""
-    asked = hit.asked
-    if asked["kind"] == "push":
-        what = f"push of {asked['force_n']:.0f} N over {asked['duration_s']:.2g} s"
-    elif asked["kind"] == "strike":
+    values = hit.values
+    if values["kind"] == "push":
+        what = f"push of {values['force_n']:.0f} N over {values['duration_s']:.2g} s"
+    elif values["kind"] == "strike":
         what = "strike"
     else:
-        what = f"{asked['kind']} of {asked['mass_kg']:.2g} kg at {asked['speed_m_s']:.3g} m/s"
-    what += f" from {side_of(asked['from_deg'])}"
+        what = f"{values['kind']} of {values['mass_kg']:.2g} kg at {values['speed_m_s']:.3g} m/s"
+    what += f" from {direction_words(values['from_deg'])}"
     if response.diverged is not None:
         return f"{what}: the simulation diverged ({response.diverged.warning})"
     if response.contact is None or response.choice is None:
         return f"{what}: missed"
     body = response.contact.body.replace("_", " ")
     made = " (built-in motions)" if _has_built_in(hit, response) else ""
-    return f"{what}, hits the {body}: {spoken(response.choice)}{made}"
+    return f"{what}, hits the {body}: {reaction_title(response.choice)}{made}"
 
 
 def _has_built_in(hit: Hit, response: Response) -> bool:
@@ -137,12 +133,12 @@ def _has_built_in(hit: Hit, response: Response) -> bool:
     return any(name.startswith(PREFIX) for name in names)
 
 
-def spoken(choice: str) -> str:
+def reaction_title(choice: str) -> str:
     """The name of a reaction in words."""
     return choice.replace("_mirrored", ", mirrored").replace("_", " ")
 
 
-def side_of(from_deg: float) -> str:
+def direction_words(from_deg: float) -> str:
     """Where an impact comes from, in words.
 
     Args:

@@ -1,4 +1,4 @@
-"""From a response to what is shown: cut to size, with the ball coming and the second character."""
+"""What the recording, pictures and video show of a response: ball, second character, events."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROLL_S = 0.7
 
 
 @dataclass(frozen=True)
-class Shown:
+class ResponseStory:
     """A response as it is written and shown.
 
     Attributes:
@@ -34,8 +34,10 @@ class Shown:
     first: int
 
 
-def show(response: Response, impact: Impact, lead_in_s: float, title: str, subtitle: str) -> Shown:
-    """Cut a response to size and put ball, second character and events with it.
+def response_story(
+    response: Response, impact: Impact, lead_in_s: float, title: str, subtitle: str
+) -> ResponseStory:
+    """Cut a response to what is shown, and add ball, second character and events.
 
     Args:
         response: The response.
@@ -67,7 +69,7 @@ def show(response: Response, impact: Impact, lead_in_s: float, title: str, subti
         title=title,
         subtitle=subtitle,
     )
-    return Shown(story, first)
+    return ResponseStory(story, first)
 
 
 def _events(response: Response, first: int, end: float) -> list[StoryEvent]:
@@ -97,11 +99,11 @@ def _phases(response: Response, first: int, end: float) -> list[StoryPhase]:
 
 
 def _ball_track(track: FloatArray, prepared: PreparedImpact, fps: float) -> FloatArray:
-    """Where a ball is in every frame (frames, 3): its flight before and after it is simulated too.
+    """Where a ball is in every frame (frames, 3), also before and after it is simulated.
 
     Args:
         track: (frames, 3) [m], NaN where it was not simulated.
-        prepared: How it was let go.
+        prepared: How it was launched.
         fps: Frame rate [1/s].
     """
     assert prepared.impactor_pose is not None

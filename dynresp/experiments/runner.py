@@ -13,18 +13,18 @@ from dynresp.experiments import batch_summary as batch
 from dynresp.experiments.experiment_spec import Experiment
 from dynresp.experiments.response_files import write_response
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.named_motion import Taken, take_motion
-from dynresp.motion.reactions.named_library import about_library, take_library
+from dynresp.motion.named_motion import NamedMotion, load_spec_motion
+from dynresp.motion.reactions.named_library import library_record, load_named_library
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.physics.drawn_hits import Hit, draw_hits
 from dynresp.physics.impact_spec import StrikerCut, StrikeTable
 from dynresp.physics.impacts import Ball, prepare
-from dynresp.response.chooser import Choosing, take_chooser
+from dynresp.response.chooser import NamedChooser, make_chooser
 from dynresp.response.responder import Responder
 from dynresp.response.response import Response, ResponseConfig
 from dynresp.response.response_quality import Quality, measure
-from dynresp.response.response_settings import in_force, response_config
+from dynresp.response.response_settings import response_config, settings_record
 from dynresp.results.result_folder import (
     RESULT,
     SUMMARY,
@@ -42,7 +42,7 @@ _BUNDLE = 100
 
 
 @dataclass(frozen=True)
-class Answer:
+class HitResult:
     """One hit and what came of it."""
 
     hit: Hit
@@ -69,10 +69,10 @@ class Run:
     experiment: Experiment
     seed: int
     character: Character
-    base: Taken
-    striker: Taken | None
+    base: NamedMotion
+    striker: NamedMotion | None
     library: ReactionLibrary
-    choosing: Choosing
+    choosing: NamedChooser
     config: ResponseConfig
     threads: int = 0
     responder: Responder = field(init=False, repr=False)
@@ -93,8 +93,8 @@ class Run:
         assert isinstance(cut, StrikerCut)
         return draw_hits(table, self.seed, numbers, self.striker.motion, cut.hit_s, cut.side)
 
-    def answers(self, numbers: range, progress: Progress) -> Iterator[Answer]:
-        """Answer hits, bundle by bundle."""
+    def results(self, numbers: range, progress: Progress) -> Iterator[HitResult]:
+        """HitResult hits, bundle by bundle."""
         for start in range(numbers.start, numbers.stop, _BUNDLE):
             hits = self.hits(range(start, min(start + _BUNDLE, numbers.stop)))
 
@@ -105,23 +105,23 @@ class Run:
                 [(self.base.motion, hit.impact) for hit in hits], tell
             )
             for hit, response in zip(hits, responses, strict=True):
-                yield Answer(hit, response, measure(response, self.character))
+                yield HitResult(hit, response, measure(response, self.character))
 
-    def about(self) -> dict[str, Any]:
+    def record(self) -> dict[str, Any]:
         """What `result.json` says about the whole experiment."""
-        told: dict[str, Any] = {
+        record: dict[str, Any] = {
             "experiment": self.experiment.experiment.name,
             "seed": self.seed,
             "count": self.experiment.experiment.count,
-            "base": self.base.about,
+            "base": self.base.record,
         }
         if self.striker is not None:
-            told["striker"] = self.striker.about
+            record["striker"] = self.striker.record
         return {
-            **told,
-            "library": about_library(self.library, self.experiment.library.which),
-            "choosing": self.choosing.about,
-            "settings": in_force(self.config),
+            **record,
+            "library": library_record(self.library, self.experiment.library.which),
+            "choosing": self.choosing.record,
+            "settings": settings_record(self.config),
             "output": self.experiment.output.model_dump(),
             "character": self.character.identity,
             "versions": versions(),
@@ -142,7 +142,7 @@ def prepare_run(
         experiment: The file.
         beside: Its folder, from which relative paths count.
         motions: Motions folder that the user named.
-        seed: Taken instead of the file's own.
+        seed: Used instead of the file's own.
         threads: Threads for the physics, 0 for all cores.
         choice: Keys of `[choice]` that are taken instead of the file's own.
 
@@ -155,7 +155,7 @@ def prepare_run(
     folders = motion_folders(motions)
     config = response_config(experiment.settings)
     fps = config.physics.fps
-    base = take_motion(
+    base = load_spec_motion(
         experiment.base, experiment.base.otherwise, "base", folders, beside, fps, character
     )
     striker = None
@@ -163,7 +163,7 @@ def prepare_run(
     if isinstance(impact, StrikeTable):
         table = impact.striker
         key = "impact.striker"
-        striker = take_motion(table, table.otherwise, key, folders, beside, fps, character)
+        striker = load_spec_motion(table, table.otherwise, key, folders, beside, fps, character)
         cut = striker.cut
         assert isinstance(cut, StrikerCut)
         if cut.hit_s > striker.motion.duration:
@@ -171,11 +171,11 @@ def prepare_run(
                 f"{key}.hit_s: expected at most {striker.motion.duration:.2f} s, which is how long "
                 f"the striker's motion lasts, got {cut.hit_s:g}"
             )
-    library = take_library(experiment.library.which, folders, beside, fps, character)
+    library = load_named_library(experiment.library.which, folders, beside, fps, character)
     chosen = experiment.experiment.seed if seed is None else seed
     try:
-        asked = experiment.choice.model_copy(update=dict(choice or {}))
-        choosing = take_chooser(asked, character, library, config, beside)
+        choice_table = experiment.choice.model_copy(update=dict(choice or {}))
+        choosing = make_chooser(choice_table, character, library, config, beside)
     except MotionError as error:
         # A clip of the library that is shorter than a window.
         raise SpecError(f"settings.window_s: {error}") from None
@@ -205,7 +205,7 @@ def _time(hit: Hit) -> float:
 
 
 def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dict[str, Any]:
-    """Answer all hits of an experiment and write the result folder.
+    """HitResult all hits of an experiment and write the result folder.
 
     Args:
         run: The experiment, loaded.
@@ -213,18 +213,18 @@ def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dic
         progress: Called with the stage, how many are done, and of how many.
 
     Returns:
-        See `write_answers`.
+        See `write_results`.
 
     Raises:
         DynrespError: `result.json` or `summary.json` cannot be written.
     """
     progress = progress or no_progress
     count = run.experiment.experiment.count
-    return write_answers(run, run.answers(range(count), progress), out, progress)
+    return write_results(run, run.results(range(count), progress), out, progress)
 
 
-def write_answers(
-    run: Run, answers: Iterable[Answer], out: Path, progress: Progress
+def write_results(
+    run: Run, results: Iterable[HitResult], out: Path, progress: Progress
 ) -> dict[str, Any]:
     """Write the result folder of an experiment.
 
@@ -233,7 +233,7 @@ def write_answers(
 
     Args:
         run: The experiment, loaded.
-        answers: All its answers, in order. Those that are not written in full are not kept.
+        results: All its results, in order. Those that are not written in full are not kept.
         out: Folder to write to; made if it is missing.
         progress: Called with the stage, how many are done, and of how many.
 
@@ -244,38 +244,38 @@ def write_answers(
         DynrespError: `result.json` or `summary.json` cannot be written.
     """
     table = run.experiment.experiment
-    about = run.about()
+    record = run.record()
 
-    def write(answer: Answer, where: Path, title: str) -> dict[str, Any]:
+    def write(result: HitResult, where: Path, title: str) -> dict[str, Any]:
         return write_response(
-            where, title, answer.hit, answer.response, answer.quality, about,
-            run.experiment.output, run.character, run.config, progress,
+            where, title, result.hit, result.response, result.quality, record,
+            run.experiment.output, run.responder, progress,
         )  # fmt: skip
 
     if table.count == 1:
-        (answer,) = answers
-        return write(answer, out, table.name)
+        (result,) = results
+        return write(result, out, table.name)
 
     shown = chosen_hits(run.seed, table.count, table.show)
     rows, picked = [], []
-    for answer in answers:
-        rows.append(batch.row(answer.hit, answer.response, answer.quality))
-        if answer.hit.number in shown:
-            picked.append(answer)
+    for result in results:
+        rows.append(batch.row(result.hit, result.response, result.quality))
+        if result.hit.number in shown:
+            picked.append(result)
     files = clear_batch(out, shown)
     files[TABLE] = attempt(lambda path: batch.write_table(rows, path), out / TABLE)
-    for answer in picked:
-        number = answer.hit.number
+    for result in picked:
+        number = result.hit.number
         written: dict[str, str] = {}
 
-        def hit(path: Path, answer: Answer = answer, written: dict[str, str] = written) -> None:
-            title = f"{table.name}, hit {answer.hit.number}"
-            written |= write(answer, path.parent, title)["files"]
+        def hit(path: Path, result: HitResult = result, written: dict[str, str] = written) -> None:
+            title = f"{table.name}, hit {result.hit.number}"
+            written |= write(result, path.parent, title)["files"]
 
         name = hit_folder(number)
         files[f"{name}/{RESULT}"] = attempt(hit, out / name / RESULT)
         files |= {f"{name}/{file}": what for file, what in written.items()}
-    summary = {**about, "shown": shown, **batch.summarise(rows), "files": files}
+    summary = {**record, "shown": shown, **batch.summarise(rows), "files": files}
     write_json(summary, out / SUMMARY)
     return summary
 

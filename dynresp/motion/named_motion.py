@@ -28,21 +28,21 @@ BUILTIN_PREFIX = "builtin:"
 
 
 @dataclass(frozen=True)
-class Taken:
+class NamedMotion:
     """A motion that an experiment uses.
 
     Attributes:
-        motion: Cut, mirrored and at the frame rate asked for.
-        about: Where it comes from, for `result.json`.
+        motion: Cut, mirrored and at the wanted frame rate.
+        record: Where it comes from, for `result.json`.
         cut: The table that named it: of two, the one that could be had.
     """
 
     motion: Motion
-    about: dict[str, Any]
+    record: dict[str, Any]
     cut: MotionCut
 
 
-def take_motion(
+def load_spec_motion(
     cut: MotionCut,
     otherwise: MotionCut | None,
     key: str,
@@ -50,7 +50,7 @@ def take_motion(
     beside: Path,
     fps: float,
     character: Character,
-) -> Taken:
+) -> NamedMotion:
     """Load the motion that a table names, or else the one it names for want of the first.
 
     Args:
@@ -69,8 +69,8 @@ def take_motion(
     """
     found = find_motion(cut.motion, folders, beside)
     if found is None and otherwise is not None:
-        taken = take_motion(otherwise, None, f"{key}.or", folders, beside, fps, character)
-        return replace(taken, about={**taken.about, "instead_of": cut.motion})
+        taken = load_spec_motion(otherwise, None, f"{key}.or", folders, beside, fps, character)
+        return replace(taken, record={**taken.record, "instead_of": cut.motion})
     if found is None:
         looked = ", ".join(str(folder) for folder in [beside, *folders])
         raise MissingMotionDataError(
@@ -79,7 +79,7 @@ def take_motion(
             f'`dynresp motions fetch core`, or write or = "{BUILTIN_PREFIX}walk" beside it.'
         )
     motion = load_cut(cut, found, key, character).resampled(fps)
-    return Taken(motion, about_cut(cut, found), cut)
+    return NamedMotion(motion, cut_record(cut, found), cut)
 
 
 def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str | None:
@@ -163,11 +163,11 @@ def load_cut(cut: MotionCut, found: Path | str, key: str, character: Character) 
     motion = _load(cut, found, character)
     stop_s = motion.duration if cut.stop_s is None else cut.stop_s
     if cut.start_s >= motion.duration or stop_s > motion.duration + 0.5 / motion.fps:
-        asked = "start_s" if cut.start_s >= motion.duration else "stop_s"
+        cut_key = "start_s" if cut.start_s >= motion.duration else "stop_s"
         raise SpecError(
-            f"{key}.{asked}: expected at most {motion.duration:.2f} s, which is how long "
+            f"{key}.{cut_key}: expected at most {motion.duration:.2f} s, which is how long "
             f"{cut.motion!r} lasts{' without its T-poses' if cut.trim_t_pose else ''}, "
-            f"got {getattr(cut, asked):g}"
+            f"got {getattr(cut, cut_key):g}"
         )
     first, last = round(cut.start_s * motion.fps), round(stop_s * motion.fps)
     part = motion.slice(first, min(last + 1, len(motion)))
@@ -188,7 +188,7 @@ def _load(cut: MotionCut, found: Path | str, character: Character) -> Motion:
     return load_motion(found, character, options)
 
 
-def about_cut(cut: MotionCut, found: Path | str) -> dict[str, Any]:
+def cut_record(cut: MotionCut, found: Path | str) -> dict[str, Any]:
     """Where a motion comes from, for `result.json`, without saying where on this machine.
 
     Args:
@@ -198,13 +198,13 @@ def about_cut(cut: MotionCut, found: Path | str) -> dict[str, Any]:
     told = cut.model_dump(exclude_defaults=True, by_alias=True, exclude={"otherwise", "hit_s"})
     if isinstance(found, str):
         return {**told, "built_in": True}
-    about: dict[str, Any] = {
+    record: dict[str, Any] = {
         **told,
         "built_in": False,
         "sha256": hashlib.sha256(found.read_bytes()).hexdigest(),
     }
     source = load_sources().get(cut.motion)
-    if source is not None and source.sha256 == about["sha256"]:
-        about["credit"] = load_licences()[source.source_repo].credit
-        about["licence"] = source.licence
-    return about
+    if source is not None and source.sha256 == record["sha256"]:
+        record["credit"] = load_licences()[source.source_repo].credit
+        record["licence"] = source.licence
+    return record

@@ -19,12 +19,12 @@ class Hit:
 
     Attributes:
         number: Its place in the experiment, from 0.
-        asked: The impact's keys and the values drawn for this hit; units stand in the keys.
+        values: The impact's keys and the values drawn for this hit; units stand in the keys.
         impact: The same for the simulation.
     """
 
     number: int
-    asked: dict[str, Any]
+    values: dict[str, Any]
     impact: Impact
 
 
@@ -52,35 +52,35 @@ def draw_hits(
     for n in numbers:
         rng = np.random.default_rng((seed, n))
         keys = [key for key in type(table).model_fields if key != "striker"]
-        asked = {key: draw(getattr(table, key), rng) for key in keys}
-        hits.append(Hit(n, asked, _impact(table, asked, strike, strike_s, side)))
+        values = {key: draw(getattr(table, key), rng) for key in keys}
+        hits.append(Hit(n, values, _impact(table, values, strike, strike_s, side)))
     return hits
 
 
 def _impact(
-    table: ImpactTable, asked: dict[str, Any], strike: Motion | None, strike_s: float, side: str
+    table: ImpactTable, values: dict[str, Any], strike: Motion | None, strike_s: float, side: str
 ) -> Impact:
-    time, bearing, target = asked["time_s"], asked["from_deg"], asked["target"]
+    time, bearing, target = values["time_s"], values["from_deg"], values["target"]
     if isinstance(table, BallTable | PunchTable):
         kind = Ball if isinstance(table, BallTable) else Punch
         return kind(
             time=time,
-            speed=asked["speed_m_s"],
-            mass=asked["mass_kg"],
-            radius=asked["radius_m"],
+            speed=values["speed_m_s"],
+            mass=values["mass_kg"],
+            radius=values["radius_m"],
             from_deg=bearing,
-            elevation_deg=asked["elevation_deg"],
+            elevation_deg=values["elevation_deg"],
             target=target,
-            height=asked["height_m"],
-            offset=asked["offset_m"],
+            height=values["height_m"],
+            offset=values["offset_m"],
         )
     if isinstance(table, PushTable):
         return Push(
             time=time,
-            force=asked["force_n"],
-            duration=asked["duration_s"],
+            force=values["force_n"],
+            duration=values["duration_s"],
             from_deg=bearing,
-            elevation_deg=asked["elevation_deg"],
+            elevation_deg=values["elevation_deg"],
             target=target,
         )
     assert isinstance(table, StrikeTable)

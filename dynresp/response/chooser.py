@@ -15,7 +15,7 @@ from dynresp.response.choice import Chooser
 from dynresp.response.prediction.classifier import Classifier, ClassifierError, TrainedFor
 from dynresp.response.prediction.classifier_file import load_classifier
 from dynresp.response.response import ResponseConfig
-from dynresp.response.response_settings import in_force
+from dynresp.response.response_settings import settings_record
 from dynresp.specs.shared_tables import Strict
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import classifier_file, expanded, models_folder
@@ -32,25 +32,25 @@ class ChoiceTable(Strict):
 
 
 @dataclass(frozen=True)
-class Choosing:
+class NamedChooser:
     """What chooses in an experiment.
 
     Attributes:
         chooser: It.
-        about: What `result.json` says of it.
+        record: What `result.json` says of it.
     """
 
     chooser: Chooser
-    about: dict[str, Any]
+    record: dict[str, Any]
 
 
-def take_chooser(
+def make_chooser(
     table: ChoiceTable,
     character: Character,
     library: ReactionLibrary,
     config: ResponseConfig,
     beside: Path,
-) -> Choosing:
+) -> NamedChooser:
     """Make what an experiment asks for.
 
     For want of a classifier for the library, the oracle chooses.
@@ -73,7 +73,7 @@ def take_chooser(
             'choice: with the budget "best" the oracle chooses, and no classifier; leave out '
             "classifier, or take another budget"
         )
-    about: dict[str, Any] = {"budget": budget}
+    record: dict[str, Any] = {"budget": budget}
     classifier = None
     if budget != "best":
         named = None if table.classifier is None else beside / expanded(table.classifier, "choice")
@@ -83,14 +83,14 @@ def take_chooser(
             if named is not None:
                 raise
             # Nobody named the file that was kept; what is shipped is as it should be.
-            about["passed_over"] = str(error)
+            record["passed_over"] = str(error)
             classifier = _shipped(library, character)
         if classifier is None:
-            about = {**about, "budget": "best", "instead_of": budget}
+            record = {**record, "budget": "best", "instead_of": budget}
             budget = "best"
     if classifier is not None:
-        about["classifier"] = _about(classifier, config)
-    return Choosing(chooser_for(budget, character, library, config, classifier), about)
+        record["classifier"] = _classifier_record(classifier, config)
+    return NamedChooser(chooser_for(budget, character, library, config, classifier), record)
 
 
 def find_classifier(
@@ -134,7 +134,7 @@ def shipped_classifier(library: str) -> Path:
     return models_folder() / f"{library}.skops"
 
 
-def _about(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:
+def _classifier_record(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:
     told: dict[str, Any] = {
         "classes": len(classifier.classes),
         "features": len(classifier.feature_names),
@@ -142,5 +142,5 @@ def _about(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:
         "dataset": classifier.trained_on.dataset,
     }
     # Trained with other settings it predicts what the oracle would have chosen with those.
-    differing = classifier.differing_settings(in_force(config))
+    differing = classifier.differing_settings(settings_record(config))
     return {**told, "other_settings": differing} if differing else told

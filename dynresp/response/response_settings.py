@@ -65,7 +65,7 @@ def response_config(settings: SettingsTable) -> ResponseConfig:
         raise SpecError(f"settings.{error}") from None
 
 
-def in_force(config: ResponseConfig) -> dict[str, Any]:
+def settings_record(config: ResponseConfig) -> dict[str, Any]:
     """What `result.json` says of the settings: every key of `[settings]`, given or not.
 
     Under `fixed` stands what an experiment file cannot set.

@@ -27,8 +27,8 @@ from dynresp.learning.holdout import Split
 from dynresp.learning.training import TrainConfig, train
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
-from dynresp.motion.named_motion import take_motion
-from dynresp.motion.reactions.named_library import take_library
+from dynresp.motion.named_motion import load_spec_motion
+from dynresp.motion.reactions.named_library import load_named_library
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.response.hit_simulation import HitStage
@@ -215,10 +215,10 @@ def situation(name: str) -> Situation:
     )
     folders, fps = motion_folders(None), config.physics.fps
     bases = tuple(
-        take_motion(base, base.otherwise, "base", folders, beside, fps, character).motion
+        load_spec_motion(base, base.otherwise, "base", folders, beside, fps, character).motion
         for base in plan.base
     )
-    library = take_library(plan.library.which, folders, beside, fps, character)
+    library = load_named_library(plan.library.which, folders, beside, fps, character)
     found = TrainedFor.of(library, character)
     if (found.library, found.character) != (facts.library_identity, facts.character_identity):
         raise UsageError(

@@ -69,7 +69,7 @@ def test_built_in_motions_that_stand_in_are_told(
     result = dynresp("generate", plan, "--out", tmp_path / "out", "--motions", tmp_path)
     assert result.exit_code == 1
     assert (
-        "built-in motions stand in for motion capture that is not on this machine "
+        "built-in motions take the place of motion capture that is not on this machine "
         "(walk.bvh, core)" in result.stderr
     )
 

@@ -38,12 +38,12 @@ def test_what_was_drawn_is_told(dataset: Path) -> None:
     data = load_dataset(dataset)
     for row in range(20):
         sample = draw_sample(plan(), (12.0, 4.0), row)
-        kind = sample.asked["kind"]
+        kind = sample.values["kind"]
         assert data.facts.kinds[data.kind[row]] == kind
-        assert data.facts.bodies[data.target[row]] == sample.asked["target"]
+        assert data.facts.bodies[data.target[row]] == sample.values["target"]
         assert (data.base[row], data.impact[row]) == (sample.base, sample.table)
         for name in ("phase", "from_deg", "speed_m_s", "force_n", "height_m"):
-            asked = sample.phase if name == "phase" else sample.asked.get(name)
+            asked = sample.phase if name == "phase" else sample.values.get(name)
             given = data.parameters[name][row]
             assert np.isnan(given) if asked is None else given == asked
 

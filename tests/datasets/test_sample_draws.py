@@ -35,11 +35,11 @@ def test_a_sample_depends_on_seed_and_index_alone(index: int, seed: int) -> None
 
 
 def test_golden_numbers() -> None:
-    # Taken with NumPy 2.4: a dataset that is begun must go on with the same samples.
+    # NamedMotion with NumPy 2.4: a dataset that is begun must go on with the same samples.
     sample = draw_sample(plan(), DURATIONS, 3)
-    assert (sample.base, sample.table, sample.asked["kind"]) == GOLDEN[:3]
+    assert (sample.base, sample.table, sample.values["kind"]) == GOLDEN[:3]
     assert sample.phase == pytest.approx(GOLDEN[3], abs=1e-12)
-    assert sample.asked["time_s"] == pytest.approx(GOLDEN[4], abs=1e-12)
+    assert sample.values["time_s"] == pytest.approx(GOLDEN[4], abs=1e-12)
 
 
 GOLDEN = (1, 0, "ball", 0.639093666561746, 2.628555932934635)

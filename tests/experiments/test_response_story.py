@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dynresp.experiments.response_story import show
+from dynresp.experiments.response_story import response_story
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Impact, Punch, Strike, prepare
@@ -32,7 +32,7 @@ def answered(character: Character, impact: Impact, simulated: int = 12) -> Respo
 
 def test_a_ball_flies_in_one_curve_from_before_the_simulation(character: Character) -> None:
     impact = Ball(time=3.0, speed=5.0, from_deg=30.0, elevation_deg=50.0)
-    shown = show(answered(character, impact), impact, 1.5, "title", "subtitle")
+    shown = response_story(answered(character, impact), impact, 1.5, "title", "subtitle")
     (ball,) = shown.story.spheres
     assert ball.radius == impact.radius
     seen = ball.positions[np.isfinite(ball.positions[:, 0])]
@@ -48,7 +48,7 @@ def test_a_ball_flies_in_one_curve_from_before_the_simulation(character: Charact
 
 def test_a_ball_comes_to_rest_on_the_floor(character: Character) -> None:
     impact = Ball(time=1.0, speed=6.0, height=2.4)
-    (ball,) = show(answered(character, impact), impact, 1.5, "", "").story.spheres
+    (ball,) = response_story(answered(character, impact), impact, 1.5, "", "").story.spheres
     heights = ball.positions[np.isfinite(ball.positions[:, 2]), 2]
     assert heights.min() >= impact.radius - 1e-9
     assert heights[-1] == pytest.approx(impact.radius)
@@ -58,14 +58,14 @@ def test_a_ball_comes_to_rest_on_the_floor(character: Character) -> None:
 
 def test_a_ball_is_not_seen_below_the_floor(character: Character) -> None:
     impact = Ball(time=3.0, speed=3.0, height=0.9)
-    (ball,) = show(answered(character, impact), impact, 1.5, "", "").story.spheres
+    (ball,) = response_story(answered(character, impact), impact, 1.5, "", "").story.spheres
     assert np.nanmin(ball.positions[:, 2]) >= impact.radius - 1e-9
 
 
 def test_a_fist_is_there_for_its_punch_alone(character: Character) -> None:
     impact = Punch(time=2.0)
     response = answered(character, impact)
-    (fist,) = show(response, impact, 1.5, "", "").story.spheres
+    (fist,) = response_story(response, impact, 1.5, "", "").story.spheres
     assert fist.name == "fist"
     there = np.isfinite(fist.positions[:, 0])
     assert there.sum() == 12 + 3
@@ -78,7 +78,7 @@ def test_the_second_character_stands_where_the_simulation_has_it(character: Char
     striker = swaying(character, 3.0, 30.0).moved(1.0, (4.0, -2.0, 0.0))
     impact = Strike(time=2.0, motion=striker, motion_time=1.2, from_deg=70.0)
     response = answered(character, impact)
-    shown = show(response, impact, 1.5, "", "")
+    shown = response_story(response, impact, 1.5, "", "")
     (other,) = shown.story.others
     opponent = response.prepared.opponent
     assert opponent is not None
@@ -93,6 +93,6 @@ def test_the_second_character_stands_where_the_simulation_has_it(character: Char
 
 def test_the_lead_in_ends_at_the_start_of_the_motion(character: Character) -> None:
     impact = Ball(time=0.5, height=2.4)
-    shown = show(answered(character, impact), impact, 1.5, "", "")
+    shown = response_story(answered(character, impact), impact, 1.5, "", "")
     assert shown.first == 0
     assert [phase.name for phase in shown.story.phases] == ["base motion"]

@@ -41,14 +41,14 @@ def test_a_strike_brings_its_motion(character: Character) -> None:
     assert isinstance(hit.impact, Strike)
     assert hit.impact.motion is motion
     assert (hit.impact.motion_time, hit.impact.side) == (0.5, "left")
-    assert "striker" not in hit.asked
+    assert "striker" not in hit.values
 
 
 def test_a_hit_depends_on_seed_and_number_alone() -> None:
     ball = table('kind="ball"\ntime_s={uniform=[1,2]}\nspeed_m_s={uniform=[4,14]}')
     many, late = draw_hits(ball, 7, range(5)), draw_hits(ball, 7, range(3, 5))
     assert many[3:] == late
-    assert len({hit.asked["time_s"] for hit in many}) == 5
+    assert len({hit.values["time_s"] for hit in many}) == 5
     assert draw_hits(ball, 8, range(1)) != many[:1]
 
 
@@ -58,9 +58,9 @@ def test_draws_stay_in_their_range() -> None:
         'target={choice=["head","chest"]}'
     )
     hits = draw_hits(ball, 1, range(300))
-    speeds = np.array([hit.asked["speed_m_s"] for hit in hits])
+    speeds = np.array([hit.values["speed_m_s"] for hit in hits])
     assert speeds.min() >= 4.0
     assert speeds.max() <= 14.0
     assert speeds.mean() == pytest.approx(9.0, abs=0.6)
-    assert {hit.asked["mass_kg"] for hit in hits} == {3.0, 8.0}
-    assert {hit.asked["target"] for hit in hits} == {"head", "chest"}
+    assert {hit.values["mass_kg"] for hit in hits} == {3.0, 8.0}
+    assert {hit.values["target"] for hit in hits} == {"head", "chest"}

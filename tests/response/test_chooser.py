@@ -20,7 +20,7 @@ from dynresp.response.prediction.classifier import ClassifierError
 from dynresp.response.prediction.classifier_choice import ClassifierChooser
 from dynresp.response.prediction.classifier_file import load_classifier, load_pipelines
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.response.response_settings import in_force
+from dynresp.response.response_settings import settings_record
 from dynresp.response.search.full_search_choice import OracleChooser
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import classifier_file
@@ -55,7 +55,7 @@ def test_the_shipped_classifier_is_for_the_built_in_library(
     names = {name for own in classifier.members for name in own}
     assert names | set(classifier.absent) == {r.name for r in builtin.reactions} | {CARRY_ON}
     # Labelled with the settings that are in force by default.
-    assert classifier.differing_settings(in_force(ResponseConfig())) == []
+    assert classifier.differing_settings(settings_record(ResponseConfig())) == []
 
 
 @pytest.mark.mocap
@@ -73,8 +73,8 @@ def test_the_shipped_classifiers_are_for_the_recorded_libraries(
 def test_it_chooses_by_default(tmp_path: Path) -> None:
     run = prepared(tmp_path)
     assert isinstance(run.responder.chooser, ClassifierChooser)
-    assert run.about()["choosing"]["budget"] == "fast"
-    (answer,) = run.answers(range(1), lambda *told: None)
+    assert run.record()["choosing"]["budget"] == "fast"
+    (answer,) = run.results(range(1), lambda *told: None)
     # The base motion and the reaction that was predicted.
     assert len(answer.response.errors) == 2
     assert answer.response.choice in answer.response.errors
@@ -83,7 +83,7 @@ def test_it_chooses_by_default(tmp_path: Path) -> None:
 def test_the_oracle_chooses_on_request(tmp_path: Path) -> None:
     run = prepared(tmp_path, choice={"budget": "best"})
     assert isinstance(run.responder.chooser, OracleChooser)
-    assert run.about()["choosing"] == {"budget": "best"}
+    assert run.record()["choosing"] == {"budget": "best"}
 
 
 def test_and_for_want_of_a_classifier(tmp_path: Path, character: Character) -> None:
@@ -94,7 +94,7 @@ def test_and_for_want_of_a_classifier(tmp_path: Path, character: Character) -> N
 
     run = prepare_run(read_experiment(file), tmp_path, tmp_path / "motions", threads=1)
     assert isinstance(run.responder.chooser, OracleChooser)
-    assert run.about()["choosing"] == {"budget": "best", "instead_of": "fast"}
+    assert run.record()["choosing"] == {"budget": "best", "instead_of": "fast"}
 
 
 def test_a_classifier_that_was_kept_comes_before_the_shipped_one(
@@ -104,7 +104,7 @@ def test_a_classifier_that_was_kept_comes_before_the_shipped_one(
     kept.parent.mkdir(parents=True)
     kept.write_bytes(b"damaged")
     # Nobody named it: what is shipped is taken, and that is said.
-    about = prepared(tmp_path).about()["choosing"]
+    about = prepared(tmp_path).record()["choosing"]
     assert str(kept) in about["passed_over"]
     assert about["budget"] == "fast"
     assert about["classifier"]["trained_on"] > 4000
@@ -117,7 +117,7 @@ def test_a_named_classifier_must_be_there_and_fit(tmp_path: Path, character: Cha
         prepared(tmp_path, choice={"classifier": "gone.skops"})
     (tmp_path / "mine.skops").write_bytes(shipped_classifier(BUILTIN).read_bytes())
     run = prepared(tmp_path, choice={"classifier": "mine.skops", "budget": "better"})
-    assert run.about()["choosing"]["budget"] == "better"
+    assert run.record()["choosing"]["budget"] == "better"
     other = dataclasses.replace(builtin_library(character), identity="another", name="another")
     with pytest.raises(ClassifierError, match="trained for the library 'builtin'"):
         find_classifier(other, character, tmp_path / "mine.skops")
@@ -132,7 +132,7 @@ def test_the_oracle_takes_no_classifier(tmp_path: Path) -> None:
 
 def test_other_settings_are_told(tmp_path: Path) -> None:
     run = prepared(tmp_path, settings={"window_s": 0.2})
-    assert run.about()["choosing"]["classifier"]["other_settings"] == ["window_s"]
+    assert run.record()["choosing"]["classifier"]["other_settings"] == ["window_s"]
 
 
 def test_the_shipped_file_reads_without_scikit_learn() -> None:

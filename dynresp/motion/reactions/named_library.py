@@ -17,7 +17,7 @@ from dynresp.support.errors import UnknownNameError
 from dynresp.support.paths import expanded
 
 
-def take_library(
+def load_named_library(
     which: str, folders: Sequence[Path], beside: Path, fps: float, character: Character
 ) -> ReactionLibrary:
     """Load the reactions that an experiment chooses from.
@@ -45,14 +45,14 @@ def take_library(
     return load_library(beside / expanded(which, "library"), folders, character, fps)
 
 
-def about_library(library: ReactionLibrary, which: str) -> dict[str, Any]:
+def library_record(library: ReactionLibrary, which: str) -> dict[str, Any]:
     """What `result.json` says of the library."""
-    about: dict[str, Any] = {
+    record: dict[str, Any] = {
         "name": library.name,
         "identity": library.identity,
         "reactions": len(library.reactions),
         "built_in": all(reaction.builtin for reaction in library.reactions),
     }
     if which == "core" and library.name == BUILTIN:
-        about["instead_of"] = which
-    return about
+        record["instead_of"] = which
+    return record

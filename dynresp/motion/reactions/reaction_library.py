@@ -59,6 +59,7 @@ class Reaction:
         mirrored: Whether left and right are exchanged.
         builtin: Whether this project made the motion; it is then no motion capture.
         source: Where it comes from, for people.
+        start_s: Where in its file the motion begins [s]; 0 for a built-in motion.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Reaction:
     mirrored: bool
     builtin: bool
     source: str
+    start_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,8 @@ def _recorded_or_builtin(
             f"of frames of {entry.file}, got [{start}, {stop}]"
         )
     source = f"{entry.file} frames {start}-{stop}"
-    return _reaction(entry, whole.slice(start, stop), source, fps, builtin=False)
+    reaction = _reaction(entry, whole.slice(start, stop), source, fps, builtin=False)
+    return replace(reaction, start_s=start / whole.fps)
 
 
 def _builtin(entry: Entry, slug: str, character: Character, fps: float) -> Reaction:
