@@ -243,7 +243,7 @@ def legible(tree):
 
 
 tree = max((forest.tree(int(frame), AHEAD_S) for frame in clustered.frames[::3]), key=legible)
-paths = [forest.probable_motion(tree, int(leaf)) for leaf in tree.leaves]
+paths = [forest.likeliest_motion(tree, int(leaf)) for leaf in tree.leaves]
 fig, axes = plt.subplots(figsize=(13, 4.4))
 entered = graphs.cluster_tree(axes, tree, fps, colors)
 for leaf, path in zip(tree.leaves, paths, strict=True):

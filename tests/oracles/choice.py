@@ -61,7 +61,7 @@ def candidates(
     waited, fps = len(lead) - 1, forest.graph.database.fps
     inside = {}
     for node in range(1, len(tree.node_clusters)):
-        way = [*lead[:-1], *tree.way_to(node).tolist()]
+        way = [*lead[:-1], *tree.frames_to(node).tolist()]
         state = along(forest, way, place)[-1]
         late = tree.steps[tree.node_visits[node]] + waited >= window.least_s * fps - 1e-6
         if late and (window.area is None or window.area.contains(state[None, :2])[0]):
@@ -82,8 +82,8 @@ def told(
     """Frames of a leaf's action from the avatar's own, and their planar states."""
     left = most - (len(lead) - 1)
     least = window.least_s * forest.graph.database.fps - 1e-6
-    probable = forest.probable_motion(tree, node, left / forest.graph.database.fps).frames
-    for way in (probable.tolist(), tree.way_to(node).tolist()):
+    probable = forest.likeliest_motion(tree, node, left / forest.graph.database.fps).frames
+    for way in (probable.tolist(), tree.frames_to(node).tolist()):
         frames = [*lead[:-1], *stay(forest, way, left)]
         states = along(forest, frames, place)
         entered = len(lead) - 1 + len(way) - 1
@@ -135,7 +135,7 @@ def choices(
     forest: ClusterForest, frame: int, place: npt.ArrayLike, window: ChoiceWindow
 ) -> list[tuple[list[int], FloatArray]]:
     """Frames of each action from the avatar's own, and their planar states (s, 4)."""
-    lead, fps = forest.branch(frame).tolist(), forest.graph.database.fps
+    lead, fps = forest.frames_to_branch(frame).tolist(), forest.graph.database.fps
     bounds = [] if window.most_s is None else [window.most_s]
     if window.most_s is None:
         longest, bound = forest.time_bound_s + (len(lead) - 1) / fps, NEAR_S

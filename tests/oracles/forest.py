@@ -81,7 +81,7 @@ def tree(
     return found
 
 
-def probable_motion(
+def likeliest_motion(
     graph: MotionGraph, clusters: Clusters, path: tuple[int, ...], root: int, steps: int
 ) -> tuple[tuple[int, ...], float]:
     """Eq. 7 by trying all walks: the best one that ends where it enters the path's last cluster."""

@@ -88,11 +88,11 @@ def choices(
         UsageError: The frame is not in the graph's component.
     """
     window = window or ChoiceWindow()
-    lead, at = forest.branch(frame), np.asarray(place, dtype=np.float64)
+    lead, at = forest.frames_to_branch(frame), np.asarray(place, dtype=np.float64)
     offered: list[OfferedAction] = []
     bounds = list(_bounds(forest, window, len(lead) - 1))
     for most_s in bounds:
-        most = forest.depth(most_s)
+        most = forest.steps_within(most_s)
         if most < len(lead):
             continue
         candidates = _Candidates.of(forest, lead, at, window, most)
@@ -181,9 +181,9 @@ class _Candidates:
         if window.area is None:
             # Where each lies need not be known first, and most of them are no leaves.
             nodes = _outermost(tree, nodes)
-        root = forest.places_along(lead, place)[-1]
+        root = forest.root_states_along(lead, place)[-1]
         clip = placement.compose(root, placement.inverse(database.planar[tree.root]))
-        places = forest.places(tree, nodes, clip)
+        places = forest.root_states(tree, nodes, clip)
         if window.area is not None:
             nodes_inside = _outermost(tree, nodes[window.area.contains(places[:, :2])])
             kept = np.searchsorted(nodes, nodes_inside)
@@ -233,12 +233,12 @@ class _Candidates:
         forest, tree = self.forest, self.tree
         waited = len(self.lead) - 1
         left = self.most - waited
-        probable = forest.probable_motion(tree, node, left / forest.graph.database.fps)
+        probable = forest.likeliest_motion(tree, node, left / forest.graph.database.fps)
         enters = waited + len(probable.frames) - 1
         frames, path, inside = self._staying(probable.frames, left)
         if enters < self.least or not inside[enters:].any():
             # The most probable way does not come into the window; the tree's own one does.
-            way = tree.way_to(node)
+            way = tree.frames_to(node)
             enters = waited + len(way) - 1
             frames, path, inside = self._staying(way, left)
         stop = int(np.flatnonzero(inside)[-1]) + 1
@@ -248,7 +248,7 @@ class _Candidates:
     def _staying(self, way: IntArray, left: int) -> tuple[IntArray, FloatArray, BoolArray]:
         """Frames, their places, and whether each is in the window, along a way and its stay."""
         frames = np.concatenate([self.lead[:-1], self.forest.stay(way, left)])
-        path = self.forest.places_along(frames, self.place)
+        path = self.forest.root_states_along(frames, self.place)
         area = self.window.area
         inside = np.ones(len(path), bool) if area is None else area.contains(path[:, :2])
         return frames, path, inside

@@ -1,20 +1,21 @@
-"""The cluster forest: what the avatar can do from each frame (Lee et al. 2002, section 4.2.2).
+"""Cluster trees: which clusters can be reached from a frame (Lee et al. 2002, section 4.2.2).
 
-A cluster tree begins with the cluster of a frame, and has a child wherever the ways on from there
-lead into another cluster. The paper visits frames depth first up to a time bound; taken by the
-letter, that walks every way through the graph, and their number grows exponentially. Here, as its
-word "spanning tree" suggests, each frame is visited once a tree. Frames are visited in the order
-of time, so that whatever can be reached within the bound is in the tree, by the shortest way
-there, and of ways equally short by the most probable one. Children of a node that are of the same
-cluster are one. A tree so has at most as many nodes as there are frames; a tree of 15 s takes a
-fraction of a millisecond to grow, so that none is kept.
+The root of a tree is the cluster of a frame. A node has a child wherever the edges of the graph
+lead from it into another cluster. The paper visits frames depth first up to a time bound. Read
+literally, that follows every path through the graph, and the number of paths grows exponentially.
+Here each frame is visited once in a tree, as the paper's word "spanning tree" suggests, and in the
+order of time: every frame that can be reached within the bound is in the tree, by a shortest path,
+and among the shortest ones by the most probable. Children of one node with the same cluster are
+merged. So a tree has at most as many nodes as there are frames. A tree of 15 s takes a fraction of
+a millisecond to grow, so none is kept.
 
 A cluster path leads from the root to a node. Its most probable motion (eq. 7, section 4.2.3) may
-take any way that stays on the path, not only the tree's, and may come through a frame twice.
+use every edge that stays on the cluster path, not only those of the tree, and may visit a frame
+twice.
 
-Of the jumps from one frame into one cluster only the three most probable are followed. They leave
-the same pose for alike ones; where hundreds of jumps leave a frame, the others would cost ten times
-the time and tell nothing new.
+Of the jumps from one frame into one cluster only the three most probable are followed. All of them
+start at one pose and end at similar ones. Where hundreds of jumps leave a frame, the others would
+take ten times as long and add nothing new.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.clusters.frame_clusters import Clusters
-from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.locomotion.graph.placement import IDENTITY
 from dynresp.locomotion.graph.random_walk import check_in_component
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray, frozen
@@ -35,24 +36,23 @@ from dynresp.support.errors import UsageError
 
 TIME_BOUND_S = 15.0
 """How far cluster trees look ahead (section 4.2.2) [s]."""
-# Jumps from one frame into one cluster that are followed.
-_ALIKE = 3
+# So many jumps from one frame into one cluster are followed.
+_MAX_ALIKE_JUMPS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class ClusterTree:
-    """The clusters that can be reached from a frame.
+    """The clusters that can be reached from a frame. The arrays are read-only.
 
-    Frames were visited one after the other, and visit 0 is the root's; nodes were made one after
-    the other, and node 0 is the root. Arrays are read-only.
+    Visits and nodes are numbered in the order of time. Visit 0 and node 0 are the root's.
 
     Attributes:
         frames: (v,) frame of each visit.
-        parents: (v,) the visit from which each came; -1 of the root.
-        ways: (v,) the way of the graph by which it came; -1 of the root.
+        parents: (v,) the visit before each; -1 of the root.
+        edges: (v,) edge of the graph that leads to each; -1 of the root.
         steps: (v,) frames from the root.
-        nodes: (v,) node to which each visit belongs.
-        log_probabilities: (v,) of the way to each visit.
+        nodes: (v,) node of each visit.
+        log_probabilities: (v,) of the path to each visit.
         node_clusters: (k,) cluster of each node.
         node_parents: (k,) -1 of the root.
         node_visits: (k,) the first visit of each node, where the avatar enters it.
@@ -60,7 +60,7 @@ class ClusterTree:
 
     frames: IntArray
     parents: IntArray
-    ways: IntArray
+    edges: IntArray
     steps: IntArray
     nodes: IntArray
     log_probabilities: FloatArray
@@ -70,7 +70,7 @@ class ClusterTree:
 
     @property
     def root(self) -> int:
-        """The frame to which the tree belongs."""
+        """The frame at which the tree starts."""
         return int(self.frames[0])
 
     @functools.cached_property
@@ -82,23 +82,23 @@ class ClusterTree:
 
     def cluster_path(self, node: int) -> IntArray:
         """Clusters from the root to a node; neighbours differ."""
-        from dynresp.locomotion.clusters.cluster_forest_kernel import back_kernel
+        from dynresp.locomotion.clusters.cluster_forest_kernel import values_from_root_kernel
 
-        return back_kernel(self.node_clusters, self.node_parents, node)
+        return values_from_root_kernel(self.node_clusters, self.node_parents, node)
 
-    def way_to(self, node: int) -> IntArray:
+    def frames_to(self, node: int) -> IntArray:
         """Frames from the root to the first of a node, along the tree."""
-        from dynresp.locomotion.clusters.cluster_forest_kernel import back_kernel
+        from dynresp.locomotion.clusters.cluster_forest_kernel import values_from_root_kernel
 
-        return back_kernel(self.frames, self.parents, self.node_visits[node])
+        return values_from_root_kernel(self.frames, self.parents, self.node_visits[node])
 
 
 @dataclass(frozen=True, eq=False)
-class ProbableMotion:
-    """The most probable way along a cluster path.
+class LikeliestMotion:
+    """The most probable motion along a cluster path.
 
     Attributes:
-        frames: (s,) the first is the root, the last is the first in the path's last cluster.
+        frames: (s,) from the root to the first in the path's last cluster.
         log_probability: Logarithm of eq. 7.
     """
 
@@ -121,8 +121,13 @@ class ClusterForest:
         """Prepare to grow trees.
 
         Raises:
-            UsageError: The clusters are another database's, or the time bound is not above 0.
+            UsageError: The clusters are those of another database, or the time bound is not above
+                0.
         """
+        # The module compiles its loops when it is imported.
+        from dynresp.locomotion.clusters import cluster_forest_kernel as tree_kernel
+        from dynresp.locomotion.clusters import likeliest_motion_kernel as motion_kernel
+
         if len(clusters.labels) != len(graph.database):
             raise UsageError(
                 f"the clusters are of {len(clusters.labels)} frames, the graph has "
@@ -133,41 +138,42 @@ class ClusterForest:
         self.graph = graph
         self.clusters = clusters
         self.time_bound_s = time_bound_s
-        self._ways = _followed(graph, clusters)
-        self._offsets = frozen(np.searchsorted(self._ways, graph.offsets))
-        self._targets = frozen(graph.targets[self._ways])
-        self._logs = frozen(np.log(graph.probabilities[self._ways]))
-        # Of each frame the most probable next one; of frames outside the graph any.
-        likeliest = np.zeros(len(graph.database), dtype=np.int32)
-        # Of equally probable ones the first of the row, which is the recorded one, is written last.
-        order = np.argsort(-graph.probabilities, kind="stable")[::-1]
-        likeliest[graph.sources[order]] = graph.targets[order]
-        self._likeliest = frozen(likeliest)
+        self._followed = _followed(graph, clusters)
+        targets = graph.targets[self._followed]
+        sources = graph.sources[self._followed]
+        logs = np.log(graph.probabilities[self._followed])
+        self._edges = tree_kernel.Edges(
+            frozen(np.searchsorted(self._followed, graph.offsets)), frozen(targets), frozen(logs)
+        )
+        self._graph = tree_kernel.GraphArrays(
+            graph.offsets, graph.targets, graph.placements, graph.database.successors,
+            graph.database.planar,
+        )  # fmt: skip
+        # The same edges, in rows of those that lead to each frame.
+        back, n = np.argsort(targets, kind="stable"), len(graph.database)
+        self._incoming = motion_kernel.IncomingEdges(
+            frozen(np.searchsorted(targets[back], np.arange(n + 1))), frozen(sources[back])
+        )
         labels = clusters.labels
-        own = clusters.log_probabilities[np.arange(len(labels)), labels]
-        self._belongs = frozen(own.astype(np.float64))
+        memberships = clusters.log_probabilities[np.arange(n), labels].astype(np.float64)
         order = np.argsort(labels, kind="stable")
-        self._sizes = frozen(np.bincount(labels, minlength=len(clusters)).astype(np.int32))
-        begins = np.cumsum(self._sizes) - self._sizes
-        ranks = np.empty(len(labels), dtype=np.int32)
-        ranks[order] = np.arange(len(labels)) - begins[labels[order]]
-        self._ranks = frozen(ranks)
-        self._members = frozen(order.astype(np.int32))
-        # What it costs at least to enter one cluster from another.
-        leaps = np.full((len(clusters), len(clusters)), np.inf)
-        into, sources = self._targets, graph.sources[self._ways]
-        np.minimum.at(leaps, (labels[sources], labels[into]), -self._logs - self._belongs[into])
-        self._leaps = frozen(leaps)
-        # The same ways, in rows of those that lead to each frame.
-        back = np.argsort(into, kind="stable")
-        self._back_sources = frozen(sources[back])
-        self._back_offsets = frozen(np.searchsorted(into[back], np.arange(len(labels) + 1)))
+        sizes = np.bincount(labels, minlength=len(clusters)).astype(np.int32)
+        begins = np.cumsum(sizes) - sizes
+        ranks = np.empty(n, dtype=np.int32)
+        ranks[order] = np.arange(n) - begins[labels[order]]
+        entry_costs = np.full((len(clusters), len(clusters)), np.inf)
+        np.minimum.at(entry_costs, (labels[sources], labels[targets]), -logs - memberships[targets])
+        self._clusters = motion_kernel.ClusterArrays(
+            labels, frozen(memberships), frozen(ranks), frozen(sizes),
+            frozen(order.astype(np.int32)), frozen(entry_costs),
+        )  # fmt: skip
+        self._likeliest = _likeliest_next(graph)
 
-    def branch(self, frame: int) -> IntArray:
-        """Frames from one to the first with several ways on, whose tree it shares.
+    def frames_to_branch(self, frame: int) -> IntArray:
+        """Frames from one to the first with several edges; all of them share its tree.
 
         Args:
-            frame: A frame of the graph; the first that is returned.
+            frame: A frame of the graph; the first of the result.
 
         Raises:
             UsageError: The frame is not in the graph's component.
@@ -183,7 +189,7 @@ class ClusterForest:
         return np.array(frames[:1] if circle else frames, dtype=np.int32)
 
     def tree(self, frame: int, time_bound_s: float | None = None) -> ClusterTree:
-        """The cluster tree of a frame: that of the next branch, where it has only one way on.
+        """The cluster tree of a frame; with a single edge, that of the next branch.
 
         Args:
             frame: A frame of the graph.
@@ -192,143 +198,145 @@ class ClusterForest:
         Raises:
             UsageError: The frame is not in the graph's component.
         """
-        from dynresp.locomotion.clusters.cluster_forest_kernel import grow_kernel
+        from dynresp.locomotion.clusters.cluster_forest_kernel import TreeArrays, grow_kernel
 
-        root = int(self.branch(frame)[-1])
+        root = int(self.frames_to_branch(frame)[-1])
         n = len(self.graph.database)
-        frames, parents, ways, steps, nodes = (np.empty(n, dtype=np.int32) for _ in range(5))
-        made = [np.empty(n, dtype=np.int32) for _ in range(3)]
-        values = np.empty(n)
-        count, size = grow_kernel(
-            self._offsets, self._targets, self._logs, self.clusters.labels, root,
-            self.depth(time_bound_s), frames, parents, ways, steps, nodes, values, *made,
-        )  # fmt: skip
-        ways[1:count] = self._ways[ways[1:count]]
-        values.flags.writeable = False
-        for array in (frames, parents, ways, steps, nodes, *made):
+        room = {name: np.empty(n, dtype=np.int32) for name in TreeArrays._fields}
+        room["log_probabilities"] = np.empty(n)
+        arrays = TreeArrays(**room)
+        depth = self.steps_within(time_bound_s)
+        visits, nodes = grow_kernel(self._edges, self.clusters.labels, root, depth, arrays)
+        arrays.edges[1:visits] = self._followed[arrays.edges[1:visits]]
+        for array in arrays:
             array.flags.writeable = False
         return ClusterTree(
-            frames[:count], parents[:count], ways[:count], steps[:count], nodes[:count],
-            values[:count], *(array[:size] for array in made),
-        )  # fmt: skip
+            **{
+                name: array[: nodes if name.startswith("node_") else visits]
+                for name, array in room.items()
+            }
+        )
 
-    def places(
+    def root_states(
         self,
         tree: ClusterTree,
         nodes: npt.NDArray[np.integer],
-        place: npt.ArrayLike = placement.IDENTITY,
+        placement: npt.ArrayLike = IDENTITY,
     ) -> FloatArray:
-        """Where the root enters nodes along the tree's own ways.
+        """Where the root enters nodes, along the tree.
 
         Args:
             tree: The tree.
             nodes: (k,) of it.
-            place: (4,) where the clip of the tree's root is put.
+            placement: (4,) of the clip of the tree's root.
 
         Returns:
-            (k, 4) planar states.
+            (k, 4) planar states: x, y, z [m] and yaw [rad].
         """
-        from dynresp.locomotion.clusters.cluster_forest_kernel import place_kernel
+        from dynresp.locomotion.clusters.cluster_forest_kernel import root_states_kernel
 
-        database = self.graph.database
-        return place_kernel(
-            tree.frames, tree.parents, tree.ways, frozen(tree.node_visits[nodes]),
-            database.successors, self.graph.placements, database.planar, _row(place),
+        return root_states_kernel(
+            self._graph, tree.frames, tree.parents, tree.edges, frozen(tree.node_visits[nodes]),
+            _row(placement),
         )  # fmt: skip
 
-    def places_along(self, frames: IntArray, place: npt.ArrayLike) -> FloatArray:
-        """(s, 4) planar states of the root along frames (s,).
+    def root_states_along(self, frames: IntArray, placement: npt.ArrayLike) -> FloatArray:
+        """(s, 4) planar states of the root along frames (s,): x, y, z [m] and yaw [rad].
 
         Args:
             frames: Each follows the one before.
-            place: (4,) where the clip of the first is put.
+            placement: (4,) of the clip of the first.
 
         Raises:
-            UsageError: No way of the graph leads from one to the next.
+            UsageError: No edge of the graph leads from one to the next.
         """
-        from dynresp.locomotion.clusters.cluster_forest_kernel import along_kernel
+        from dynresp.locomotion.clusters.cluster_forest_kernel import root_states_along_kernel
 
-        graph, along = self.graph, np.empty((len(frames), 4))
-        placed = along_kernel(
-            graph.offsets, graph.targets, graph.placements, graph.database.planar,
-            np.ascontiguousarray(frames, dtype=np.int32), _row(place), along,
-        )  # fmt: skip
+        states = np.empty((len(frames), 4))
+        along = np.ascontiguousarray(frames, dtype=np.int32)
+        placed = root_states_along_kernel(self._graph, along, _row(placement), states)
         if placed < len(frames):
             raise UsageError(
                 f"frame {frames[placed]} does not follow frame {frames[placed - 1]} in the graph; "
-                "give frames of a walk through it"
+                "give the frames of a walk through the graph"
             )
-        return along
+        return states
 
-    def probable_motion(
+    def likeliest_motion(
         self, tree: ClusterTree, node: int, time_bound_s: float | None = None
-    ) -> ProbableMotion:
+    ) -> LikeliestMotion:
         """The most probable motion along the cluster path to a node (eq. 7).
 
         Args:
             tree: The tree.
-            node: Where the path leads.
+            node: The end of the path.
             time_bound_s: Longest time that it may take [s], by default the forest's bound.
 
         Raises:
             UsageError: The tree itself enters the node later than that.
         """
-        from dynresp.locomotion.clusters.likeliest_motion_kernel import probable_kernel
+        from dynresp.locomotion.clusters.likeliest_motion_kernel import likeliest_motion_kernel
 
-        depth = self.depth(time_bound_s)
+        depth = self.steps_within(time_bound_s)
         entered = tree.node_visits[node]
         fewest = int(tree.steps[entered])
         if fewest > depth:
             fps = self.graph.database.fps
             raise UsageError(
                 f"the tree enters node {node} after {fewest / fps:g} s, later than the time bound "
-                f"of {depth / fps:g} s; allow at least so long"
+                f"of {depth / fps:g} s; give a bound of at least {fewest / fps:g} s"
             )
-        frames, log_probability = probable_kernel(
-            self._offsets, self._targets, self._logs, self._back_offsets, self._back_sources,
-            self._belongs, self.clusters.labels, self._ranks, self._sizes, self._members,
-            self._leaps, tree.cluster_path(node), tree.way_to(node),
-            tree.log_probabilities[entered], depth,
+        frames, log_probability = likeliest_motion_kernel(
+            self._edges, self._incoming, self._clusters, tree.cluster_path(node),
+            tree.frames_to(node), tree.log_probabilities[entered], depth,
         )  # fmt: skip
-        return ProbableMotion(frames, log_probability)
+        return LikeliestMotion(frames, log_probability)
 
-    def stay(self, frames: IntArray, most: int) -> IntArray:
-        """Go on by the most probable ways while the cluster remains the last frame's.
+    def stay(self, frames: IntArray, max_steps: int) -> IntArray:
+        """Append the most probable next frames while the cluster is the last frame's.
 
         Args:
             frames: (s,) of the graph, at least one.
-            most: Most steps from the first frame to the last.
+            max_steps: Most steps from the first frame to the last.
 
         Returns:
             The frames, and those that follow.
         """
         from dynresp.locomotion.clusters.cluster_forest_kernel import stay_kernel
 
-        return stay_kernel(
-            self._likeliest, self.clusters.labels, np.ascontiguousarray(frames, np.int32), most
-        )
+        along = np.ascontiguousarray(frames, np.int32)
+        return stay_kernel(self._likeliest, self.clusters.labels, along, max_steps)
 
-    def depth(self, time_bound_s: float | None) -> int:
-        """Frames that fit into a time bound [s]."""
+    def steps_within(self, time_bound_s: float | None) -> int:
+        """How many frames fit into a time bound [s], by default the forest's."""
         bound = self.time_bound_s if time_bound_s is None else time_bound_s
-        # A bound that is a number of frames but for rounding is that number.
+        # Rounding must not remove the last frame.
         return int(bound * self.graph.database.fps + 1e-6)
 
 
-def _row(place: npt.ArrayLike) -> FloatArray:
-    return np.ascontiguousarray(place, dtype=np.float64)
+def _row(placement: npt.ArrayLike) -> FloatArray:
+    return np.ascontiguousarray(placement, dtype=np.float64)
+
+
+def _likeliest_next(graph: MotionGraph) -> IntArray:
+    """(n,) the most probable next frame of each; of frames outside the graph any."""
+    likeliest = np.zeros(len(graph.database), dtype=np.int32)
+    # The last one written wins: among equals the first of the row, which is the recorded one.
+    order = np.argsort(-graph.probabilities, kind="stable")[::-1]
+    likeliest[graph.sources[order]] = graph.targets[order]
+    return frozen(likeliest)
 
 
 def _followed(graph: MotionGraph, clusters: Clusters) -> IntArray:
-    """Ways that trees follow, ascending: the recorded ones, and of alike jumps the best."""
+    """Edges that trees follow, ascending: the recorded ones, and the best of alike jumps."""
     into = clusters.labels[graph.targets]
     order = np.lexsort((-graph.probabilities, into, graph.sources))
     same = np.diff(into[order], prepend=-1) == 0
     same[1:] &= np.diff(graph.sources[order]) == 0
-    places = np.arange(len(order))
+    positions = np.arange(len(order))
     # How many more probable ones of the same frame and cluster there are.
-    rank = places - np.maximum.accumulate(np.where(same, 0, places))
+    rank = positions - np.maximum.accumulate(np.where(same, 0, positions))
     recorded = graph.database.successors[graph.sources] == graph.targets
     followed = recorded.copy()
-    followed[order] |= rank < _ALIKE
+    followed[order] |= rank < _MAX_ALIKE_JUMPS
     return frozen(np.flatnonzero(followed).astype(np.int32))

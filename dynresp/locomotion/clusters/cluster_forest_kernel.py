@@ -1,13 +1,13 @@
-"""The compiled part of the cluster forest: growing a tree, and following its ways.
+"""Compiled loops of the cluster forest: grow a tree, and follow its edges.
 
 Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. What is computed, and why so, is told in `forest`.
+is used. `dynresp.locomotion.clusters.cluster_forest` describes what is computed, and why.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -16,21 +16,76 @@ from dynresp.support.compiling import compiled
 
 _PLAIN: dict[str, Any] = {"error_model": "numpy"}
 
-_OFFSETS = types.Array(types.int64, 1, "C", readonly=True)
-_INTS = types.Array(types.int32, 1, "C", readonly=True)
-_REALS = types.Array(types.float64, 1, "C", readonly=True)
-_TABLE = types.Array(types.float64, 2, "C", readonly=True)
-_INT = types.int64
-_OUT = types.int32[::1]
-# fmt: off
-_GROW = types.UniTuple(types.int64, 2)(
-    _OFFSETS, _INTS, _REALS, _INTS, _INT, _INT, _OUT, _OUT, _OUT, _OUT, _OUT,
-    types.float64[::1], _OUT, _OUT, _OUT)
-_PLACE = types.float64[:, ::1](_INTS, _INTS, _INTS, _INTS, _INTS, _TABLE, _TABLE, _REALS)
-_ALONG = types.int64(_OFFSETS, _INTS, _TABLE, _TABLE, _INTS, _REALS, types.float64[:, ::1])
-_BACK = types.int32[::1](_INTS, _INTS, _INT)
-_STAY = types.int32[::1](_INTS, _INTS, _INTS, _INT)
-# fmt: on
+OFFSETS = types.Array(types.int64, 1, "C", readonly=True)
+INTS = types.Array(types.int32, 1, "C", readonly=True)
+REALS = types.Array(types.float64, 1, "C", readonly=True)
+TABLE = types.Array(types.float64, 2, "C", readonly=True)
+_INT, _OUT = types.int64, types.int32[::1]
+
+
+class Edges(NamedTuple):
+    """The edges of a motion graph that trees follow, in one row for each frame. Read-only.
+
+    Attributes:
+        offsets: (n + 1,) int64, where the row of each frame begins.
+        targets: (m,) int32, the frame to which each edge leads.
+        log_probabilities: (m,) logarithm of the probability of each.
+    """
+
+    offsets: Any
+    targets: Any
+    log_probabilities: Any
+
+
+class GraphArrays(NamedTuple):
+    """All edges of a motion graph, and where its roots are. Read-only.
+
+    Attributes:
+        offsets: (n + 1,) int64, where the row of edges of each frame begins.
+        targets: (m,) int32, the frame to which each edge leads.
+        placements: (m, 4) of the clip after each edge, in the clip before it.
+        successors: (n,) int32, the recorded next frame of each, in the same clip.
+        planar: (n, 4) states of the root at all frames, in the world of their clips.
+    """
+
+    offsets: Any
+    targets: Any
+    placements: Any
+    successors: Any
+    planar: Any
+
+
+class TreeArrays(NamedTuple):
+    """Room for a cluster tree; see `ClusterTree` for the contents.
+
+    Attributes:
+        frames: (n,) int32.
+        parents: (n,) int32.
+        edges: (n,) int32.
+        steps: (n,) int32.
+        nodes: (n,) int32.
+        log_probabilities: (n,).
+        node_clusters: (n,) int32.
+        node_parents: (n,) int32.
+        node_visits: (n,) int32.
+    """
+
+    frames: Any
+    parents: Any
+    edges: Any
+    steps: Any
+    nodes: Any
+    log_probabilities: Any
+    node_clusters: Any
+    node_parents: Any
+    node_visits: Any
+
+
+EDGES = types.NamedTuple((OFFSETS, INTS, REALS), Edges)
+_GRAPH = types.NamedTuple((OFFSETS, INTS, TABLE, INTS, TABLE), GraphArrays)
+_TREE = types.NamedTuple(
+    (_OUT, _OUT, _OUT, _OUT, _OUT, types.float64[::1], _OUT, _OUT, _OUT), TreeArrays
+)
 
 
 @njit(inline="always")
@@ -43,94 +98,82 @@ def _put(outer, inner, out):
     out[3] = math.pi - (math.pi - (outer[3] + inner[3])) % (2.0 * math.pi)
 
 
-@compiled(_GROW, **_PLAIN)
-def grow_kernel(
-    offsets, targets, logs, labels, root, depth, frames, parents, ways, steps, nodes,
-    values, node_clusters, node_parents, node_visits,
-):  # fmt: skip
+@compiled(types.UniTuple(_INT, 2)(EDGES, INTS, _INT, _INT, _TREE), **_PLAIN)
+def grow_kernel(edges, labels, root, depth, tree):
     """Grow the cluster tree of a frame, step by step in time.
 
     Args:
-        offsets: (n + 1,) rows of ways.
-        targets: (m,) of the ways.
-        logs: (m,) logarithms of their probabilities.
+        edges: Those that the tree follows.
         labels: (n,) cluster of each frame.
         root: The frame.
         depth: Steps to look ahead.
-        frames: Out, (n,) frames in the order in which they were visited.
-        parents: Out, (n,) visit from which each was reached, -1 of the root.
-        ways: Out, (n,) way by which each was reached, -1 of the root.
-        steps: Out, (n,) steps from the root.
-        nodes: Out, (n,) node to which each visit belongs.
-        values: Out, (n,) logarithm of the probability of the way to each.
-        node_clusters: Out, (n,).
-        node_parents: Out, (n,) -1 of the root.
-        node_visits: Out, (n,) the visit that came first.
+        tree: Out. Its edges are indices into `edges`.
 
     Returns:
-        How many visits and nodes there are.
+        The number of visits and of nodes.
     """
     n = len(labels)
     seen = np.full(n, np.int32(-1))
     # The newest child of a node, and the next older child of its parent.
     child, older = np.full(n, np.int32(-1)), np.empty(n, np.int32)
-    frames[0], parents[0], ways[0], steps[0], values[0], nodes[0] = root, -1, -1, 0, 0.0, 0
-    node_clusters[0], node_parents[0], node_visits[0] = labels[root], -1, 0
+    tree.frames[0], tree.parents[0], tree.edges[0], tree.steps[0] = root, -1, -1, 0
+    tree.log_probabilities[0], tree.nodes[0] = 0.0, 0
+    tree.node_clusters[0], tree.node_parents[0], tree.node_visits[0] = labels[root], -1, 0
     seen[root] = 0
     low, high, count, size = 0, 1, 1, 1
     for step in range(1, depth + 1):
         for visit in range(low, high):
-            frame = frames[visit]
-            for way in range(offsets[frame], offsets[frame + 1]):
-                target, value = targets[way], values[visit] + logs[way]
+            frame = tree.frames[visit]
+            for edge in range(edges.offsets[frame], edges.offsets[frame + 1]):
+                target = edges.targets[edge]
+                value = tree.log_probabilities[visit] + edges.log_probabilities[edge]
                 found = seen[target]
                 if found < 0:
                     found = count
-                    seen[target], frames[count], steps[count] = count, target, step
+                    seen[target], tree.frames[count], tree.steps[count] = count, target, step
                     count += 1
-                elif found < high or value <= values[found]:
+                elif found < high or value <= tree.log_probabilities[found]:
                     continue
-                parents[found], ways[found], values[found] = visit, way, value
+                tree.parents[found], tree.edges[found] = visit, edge
+                tree.log_probabilities[found] = value
         for visit in range(high, count):
-            node, cluster = nodes[parents[visit]], labels[frames[visit]]
-            if cluster != node_clusters[node]:
+            node, cluster = tree.nodes[tree.parents[visit]], labels[tree.frames[visit]]
+            if cluster != tree.node_clusters[node]:
                 own = child[node]
-                while own >= 0 and node_clusters[own] != cluster:
+                while own >= 0 and tree.node_clusters[own] != cluster:
                     own = older[own]
                 if own < 0:
                     own = size
-                    node_clusters[own], node_parents[own] = cluster, node
-                    node_visits[own], older[own], child[node] = visit, child[node], own
+                    tree.node_clusters[own], tree.node_parents[own] = cluster, node
+                    tree.node_visits[own], older[own], child[node] = visit, child[node], own
                     size += 1
                 node = own
-            nodes[visit] = node
+            tree.nodes[visit] = node
         if count in (high, n):
             break
         low, high = high, count
     return count, size
 
 
-@compiled(_PLACE, **_PLAIN)
-def place_kernel(frames, parents, ways, visits, successors, placements, planar, place):
-    """Where the root is at visited frames.
+@compiled(types.float64[:, ::1](_GRAPH, INTS, INTS, INTS, INTS, REALS), **_PLAIN)
+def root_states_kernel(graph, frames, parents, edges, visits, placement):
+    """Where the root is at visits of a tree.
 
     Args:
+        graph: The graph.
         frames: (v,) frame of each visit.
-        parents: (v,) visit before each; -1 of the first.
-        ways: (v,) by which each was reached.
-        visits: (k,) those that are asked for.
-        successors: (n,) the recorded next frame of each, which is in the same clip.
-        placements: (m, 4) of the ways.
-        planar: (n, 4) states of the root at all frames, in the world of their clips.
-        place: (4,) where the clip of the first visit is put.
+        parents: (v,) the visit before each; -1 of the first.
+        edges: (v,) edge of the graph that leads to each.
+        visits: (k,) those that are needed.
+        placement: (4,) of the clip of the first visit.
 
     Returns:
         (k, 4) planar states.
     """
-    # Of few visits the clip is needed: of those asked for, and of those on the way to them.
+    # Few visits need the placement of their clip: the given ones, and those on the way to them.
     slots = np.full(len(parents), np.int32(-1))
     clips = np.empty((len(parents), 4))
-    clips[0] = place
+    clips[0] = placement
     slots[0] = 0
     waiting = np.empty(len(parents), np.int32)
     count = 1
@@ -145,53 +188,50 @@ def place_kernel(frames, parents, ways, visits, successors, placements, planar, 
             depth -= 1
             after = waiting[depth]
             slots[after] = slots[visit]
-            if successors[frames[visit]] != frames[after]:
-                _put(clips[slots[visit]], placements[ways[after]], clips[count])
+            if graph.successors[frames[visit]] != frames[after]:
+                _put(clips[slots[visit]], graph.placements[edges[after]], clips[count])
                 slots[after] = count
                 count += 1
             visit = after
-        _put(clips[slots[visit]], planar[frames[visit]], out[k])
+        _put(clips[slots[visit]], graph.planar[frames[visit]], out[k])
     return out
 
 
-@compiled(_ALONG, **_PLAIN)
-def along_kernel(offsets, targets, placements, planar, frames, place, out):
-    """Where the root is along ways of the graph.
+@compiled(_INT(_GRAPH, INTS, REALS, types.float64[:, ::1]), **_PLAIN)
+def root_states_along_kernel(graph, frames, placement, out):
+    """Where the root is along frames of the graph.
 
     Args:
-        offsets: (n + 1,) rows of ways.
-        targets: (m,) of the ways.
-        placements: (m, 4) of the ways.
-        planar: (n, 4) states of the root at all frames, in the world of their clips.
+        graph: The graph.
         frames: (s,) each follows the one before.
-        place: (4,) where the clip of the first is put.
+        placement: (4,) of the clip of the first.
         out: Out, (s, 4) planar states.
 
     Returns:
-        How many frames were placed; fewer than all where no way leads to the next one.
+        How many frames were placed; fewer than all where no edge leads to the next one.
     """
-    clip, moved = place.copy(), np.empty(4)
+    clip, moved = placement.copy(), np.empty(4)
     for k in range(len(frames)):
         if k > 0:
-            way, end = offsets[frames[k - 1]], offsets[frames[k - 1] + 1]
-            while way < end and targets[way] != frames[k]:
-                way += 1
-            if way == end:
+            edge, end = graph.offsets[frames[k - 1]], graph.offsets[frames[k - 1] + 1]
+            while edge < end and graph.targets[edge] != frames[k]:
+                edge += 1
+            if edge == end:
                 return k
-            _put(clip, placements[way], moved)
+            _put(clip, graph.placements[edge], moved)
             clip[:] = moved
-        _put(clip, planar[frames[k]], out[k])
+        _put(clip, graph.planar[frames[k]], out[k])
     return len(frames)
 
 
-@compiled(_BACK, **_PLAIN)
-def back_kernel(values, parents, last):
-    """Values (s,) from a root to one of its descendants.
+@compiled(_OUT(INTS, INTS, _INT), **_PLAIN)
+def values_from_root_kernel(values, parents, last):
+    """Values (s,) from the root to one of its descendants.
 
     Args:
         values: (v,) of each element.
         parents: (v,) of each element; -1 of the root.
-        last: The element.
+        last: The descendant.
     """
     count, own = 0, last
     while own >= 0:
@@ -204,21 +244,21 @@ def back_kernel(values, parents, last):
     return out
 
 
-@compiled(_STAY, **_PLAIN)
-def stay_kernel(likeliest, labels, frames, most):
-    """Frames (s,), and those by which it goes on while the cluster remains.
+@compiled(_OUT(INTS, INTS, INTS, _INT), **_PLAIN)
+def stay_kernel(likeliest, labels, frames, max_steps):
+    """Frames (s,), and the most probable ones after them while the cluster stays the same.
 
     Args:
         likeliest: (n,) the most probable next frame of each.
         labels: (n,) cluster of each frame.
         frames: (s,) at least one.
-        most: Most steps from the first frame to the last.
+        max_steps: Most steps from the first frame to the last.
     """
     count = len(frames)
-    out = np.empty(max(most + 1, count), np.int32)
+    out = np.empty(max(max_steps + 1, count), np.int32)
     out[:count] = frames
     cluster = labels[out[count - 1]]
-    while count <= most and labels[likeliest[out[count - 1]]] == cluster:
+    while count <= max_steps and labels[likeliest[out[count - 1]]] == cluster:
         out[count] = likeliest[out[count - 1]]
         count += 1
     return out[:count]

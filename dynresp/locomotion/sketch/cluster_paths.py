@@ -104,8 +104,8 @@ class SketchChooser:
         corners = as_path(sketch, "a sketch")
         check_length(corners, "the sketch")
         points = resampled(corners, _SPACING)[: round(self.ahead_m / _SPACING) + 1]
-        lead = forest.branch(frame)
-        left = forest.depth(self.ahead_s) - (len(lead) - 1)
+        lead = forest.frames_to_branch(frame)
+        left = forest.steps_within(self.ahead_s) - (len(lead) - 1)
         if left < 1:
             raise UsageError(
                 f"from frame {frame} on there is no choice within ahead_s, {self.ahead_s:g} s; "
@@ -115,7 +115,7 @@ class SketchChooser:
         tree = forest.tree(frame, left_s)
         motions, paths = [], []
         for leaf in tree.leaves:
-            motion = forest.probable_motion(tree, int(leaf), left_s)
+            motion = forest.likeliest_motion(tree, int(leaf), left_s)
             frames = np.concatenate([lead[:-1], forest.stay(motion.frames, left)])
             motions.append(frames[1:])
             paths.append(self._path(frames, place)[1:])
@@ -140,6 +140,6 @@ class SketchChooser:
     def _path(self, frames: IntArray, place: npt.ArrayLike) -> FloatArray:
         """(s, 2) the centre of mass over the ground along frames."""
         database = self.forest.graph.database
-        roots = self.forest.places_along(frames, place)
+        roots = self.forest.root_states_along(frames, place)
         clips = placement.compose(roots, placement.inverse(database.planar[frames]))
         return placement.compose(clips, self._centers[frames])[:, :2]

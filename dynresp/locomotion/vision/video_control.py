@@ -57,13 +57,13 @@ def open_ways(forest: ClusterForest, frame: int, within_s: float) -> list[OpenWa
         UsageError: The frame is not in the graph's component.
     """
     labels, count = forest.clusters.labels, len(forest.clusters.mixture)
-    lead = forest.branch(frame)
+    lead = forest.frames_to_branch(frame)
     tree = forest.tree(frame, within_s)
-    steps = forest.depth(within_s)
+    steps = forest.steps_within(within_s)
     ways = [lead[:1]]
     # Where the tree is that of a later branch, the way there is one as well.
     for node in range(len(lead) == 1, len(tree.node_parents)):
-        ways.append(np.concatenate([lead, tree.way_to(node)[1:]])[: steps + 1])
+        ways.append(np.concatenate([lead, tree.frames_to(node)[1:]])[: steps + 1])
     out = []
     for way in ways:
         # Somebody who only stays may have to leave at once.
@@ -227,7 +227,7 @@ def warped_costs(
     pieces, ends = [], [0]
     for way in ways:
         along = np.concatenate([[frame], way.frames]).astype(np.int32)
-        turned = forest.places_along(along, placement.IDENTITY)[1:, 3] - planar[along[1:], 3]
+        turned = forest.root_states_along(along, placement.IDENTITY)[1:, 3] - planar[along[1:], 3]
         shift = np.round(turned / table.views.step).astype(int)
         at = (views[:, None] - shift) % table.views.count
         pieces.append(table.rows[along[1:], at].reshape(-1, table.rows.shape[2]))

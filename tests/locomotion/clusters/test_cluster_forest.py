@@ -52,14 +52,14 @@ def test_trees_are_the_slow_ones(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_probable_motions_are_the_slow_ones(seed: int) -> None:
+def test_likeliest_motions_are_the_slow_ones(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     forest = random_forest(rng, jumps=int(rng.integers(1, 9)), clusters=int(rng.integers(2, 5)))
     tree = forest.tree(int(rng.choice(forest.graph.frames)), SECONDS)
     for node in range(len(tree.node_clusters)):
-        motion = forest.probable_motion(tree, node, SECONDS)
+        motion = forest.likeliest_motion(tree, node, SECONDS)
         path = tuple(int(c) for c in tree.cluster_path(node))
-        best, value = slow.probable_motion(forest.graph, forest.clusters, path, tree.root, STEPS)
+        best, value = slow.likeliest_motion(forest.graph, forest.clusters, path, tree.root, STEPS)
         assert motion.log_probability == pytest.approx(value, abs=1e-8)
         assert tuple(motion.frames.tolist()) == best
 
@@ -71,8 +71,8 @@ def test_a_bound_in_time_makes_the_motion_shorter(rng: np.random.Generator) -> N
         tree = forest.tree(int(rng.choice(forest.graph.frames)))
         for node in tree.leaves.tolist():
             soonest = int(tree.steps[tree.node_visits[node]])
-            bounded = forest.probable_motion(tree, node, soonest / 15.0)
-            free = forest.probable_motion(tree, node)
+            bounded = forest.likeliest_motion(tree, node, soonest / 15.0)
+            free = forest.likeliest_motion(tree, node)
             assert len(bounded.frames) <= soonest + 1
             assert bounded.log_probability <= free.log_probability + 1e-9
             shorter += len(bounded.frames) < len(free.frames)
@@ -83,7 +83,7 @@ def test_nodes_know_where_they_are_entered(walking: ClusterForest) -> None:
     tree = walking.tree(int(walking.graph.frames[0]))
     assert tree.node_visits[0] == 0
     for node in range(len(tree.node_clusters)):
-        way = tree.way_to(node)
+        way = tree.frames_to(node)
         assert way[0] == tree.root
         assert set(zip(way[:-1].tolist(), way[1:].tolist(), strict=True)) <= ways(walking.graph)
         labels = walking.clusters.labels[way]
@@ -95,9 +95,9 @@ def test_places_are_those_of_playing_along(walking: ClusterForest) -> None:
     assert walking.graph.config.coordinates is Coordinates.RELATIVE
     tree = walking.tree(int(walking.graph.frames[5]))
     nodes = np.arange(len(tree.node_clusters))
-    places = walking.places(tree, nodes)
+    places = walking.root_states(tree, nodes)
     for node in nodes.tolist():
-        way = tree.way_to(node)
+        way = tree.frames_to(node)
         clip = placement.IDENTITY
         for left, entered in itertools.pairwise(way):
             move = walking.graph.placements_between([left], [entered])[0]
@@ -105,7 +105,7 @@ def test_places_are_those_of_playing_along(walking: ClusterForest) -> None:
         end = placement.compose(clip, walking.graph.database.planar[way[-1]])
         np.testing.assert_allclose(places[node][:3], end[:3], atol=1e-9)
         assert abs(placement.wrapped(places[node, 3] - end[3])) < 1e-9
-        along = walking.places_along(way, placement.IDENTITY)
+        along = walking.root_states_along(way, placement.IDENTITY)
         np.testing.assert_allclose(along[-1], places[node], atol=1e-9)
         np.testing.assert_allclose(along[0], walking.graph.database.planar[way[0]], atol=1e-9)
 
@@ -113,7 +113,7 @@ def test_places_are_those_of_playing_along(walking: ClusterForest) -> None:
 def test_frames_with_one_way_share_the_next_branch(walking: ClusterForest) -> None:
     offsets = walking.graph.offsets
     for frame in walking.graph.frames[::7].tolist():
-        lead = walking.branch(frame)
+        lead = walking.frames_to_branch(frame)
         counts = offsets[lead + 1] - offsets[lead]
         assert lead[0] == frame
         assert (counts[:-1] == 1).all()
@@ -149,7 +149,7 @@ def test_a_node_that_is_too_far_is_refused(walking: ClusterForest) -> None:
     tree = walking.tree(int(walking.graph.frames[0]))
     last = len(tree.node_clusters) - 1
     with pytest.raises(UsageError, match=f"node {last} after .* later than the time bound of 0 s"):
-        walking.probable_motion(tree, last, 0.0)
+        walking.likeliest_motion(tree, last, 0.0)
 
 
 def test_a_frame_outside_the_graph_is_refused(walking: ClusterForest) -> None:

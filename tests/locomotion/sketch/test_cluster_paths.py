@@ -34,12 +34,12 @@ def test_the_action_whose_path_is_nearest_is_taken(seed: int, character: Charact
     np.testing.assert_allclose(action.path, told(action.frames), atol=1e-9)
     assert oracle.warp(sketch, action.path, True)[0] == pytest.approx(action.cost)
     # Every leaf, in the time that is left after the frames to the first branch.
-    lead = forest.branch(frame)
-    left = forest.depth(1.5) - len(lead) + 1
+    lead = forest.frames_to_branch(frame)
+    left = forest.steps_within(1.5) - len(lead) + 1
     tree = forest.tree(frame, left / 15.0)
     costs = []
     for leaf in tree.leaves:
-        motion = forest.probable_motion(tree, int(leaf), left / 15.0)
+        motion = forest.likeliest_motion(tree, int(leaf), left / 15.0)
         frames = np.concatenate([lead, forest.stay(motion.frames, left)[1:]])[1:]
         if len(frames):
             costs.append(oracle.warp(sketch, told(frames), True)[0])
