@@ -10,7 +10,7 @@ import numpy as np
 
 from dynresp.avatar_runs.avatar_run import Outing
 from dynresp.avatar_runs.world_setup import play_in_world
-from dynresp.locomotion.choice.actions import OfferedAction, choices
+from dynresp.locomotion.choice.actions import OfferedAction, offer_actions
 from dynresp.locomotion.choice.choice_control import ChoiceControl
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.clusters.frame_clusters import Clusters
@@ -61,7 +61,7 @@ def choice_outing(
     played = 0
     while played < seconds * graph.config.fps:
         at_s = played / graph.config.fps
-        offered = choices(forest, control.frame, playback.placement)
+        offered = offer_actions(forest, control.frame, playback.placement)
         words = [in_words(action, graph.config.fps) for action in offered]
         try:
             number = pick(at_s, words)

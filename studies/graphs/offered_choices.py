@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from dynresp.locomotion.choice.actions import OfferedAction, choices
+from dynresp.locomotion.choice.actions import OfferedAction, offer_actions
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -36,11 +36,11 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
     forest = ClusterForest(graph, clusters)
     grown = time.perf_counter()
     walk = random_walk(graph, _APART * count, np.random.default_rng(seed))
-    choices(forest, int(walk[0]))
+    offer_actions(forest, int(walk[0]))
     took, busy, found = np.empty(count), np.empty(count), np.empty(count, dtype=int)
     for k, frame in enumerate(walk[::_APART].tolist()):
         begun, used = time.perf_counter(), time.thread_time()
-        offered = choices(forest, frame)
+        offered = offer_actions(forest, frame)
         busy[k] = 1e3 * (time.thread_time() - used)
         took[k] = 1e3 * (time.perf_counter() - begun)
         found[k] = len({_end(choice) for choice in offered})

@@ -19,7 +19,7 @@ from matplotlib.typing import ColorType
 
 from dynresp.avatar_runs.graph_building import build_graph
 from dynresp.avatar_runs.graph_spec import find_plan, plans_folder, read_plan
-from dynresp.locomotion.choice.actions import choices
+from dynresp.locomotion.choice.actions import offer_actions
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.frame_database import IntArray
@@ -268,7 +268,7 @@ def offered(forest: ClusterForest, seed: int) -> None:
     if graph.config.coordinates is Coordinates.RELATIVE:
         # At the origin, facing along x.
         place = placement.inverse(graph.database.planar[frame])
-    actions = choices(forest, frame, place)
+    actions = offer_actions(forest, frame, place)
     fig = plt.figure(figsize=(13, 3.4))
     plan, *cells = fig.subplots(1, 1 + len(actions), width_ratios=(2.4, *(1.0 for _ in actions)))
     ground(plan)

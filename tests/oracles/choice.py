@@ -8,7 +8,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.choice.action_window import ChoiceWindow
+from dynresp.locomotion.choice.action_window import ActionWindow
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
 from dynresp.motion.rotations import FloatArray
@@ -30,14 +30,14 @@ def along(forest: ClusterForest, frames: list[int], place: npt.ArrayLike) -> lis
     return states
 
 
-def stay(forest: ClusterForest, way: list[int], most: int) -> list[int]:
-    """A way, and the most probable frames after it while the cluster is the same."""
+def stay(forest: ClusterForest, entering: list[int], most: int) -> list[int]:
+    """Frames, and the most probable frames after it while the cluster is the same."""
     graph, labels = forest.graph, forest.clusters.labels
-    frames = list(way)
+    frames = list(entering)
     while len(frames) <= most:
         row = range(int(graph.offsets[frames[-1]]), int(graph.offsets[frames[-1] + 1]))
         following = int(graph.targets[max(row, key=lambda k: float(graph.probabilities[k]))])
-        if labels[following] != labels[way[-1]]:
+        if labels[following] != labels[entering[-1]]:
             break
         frames.append(following)
     return frames
@@ -55,38 +55,38 @@ def candidates(
     tree: ClusterTree,
     lead: list[int],
     place: npt.ArrayLike,
-    window: ChoiceWindow,
+    window: ActionWindow,
 ) -> dict[int, FloatArray]:
     """The leaves of the part of a tree that a window selects, and where they are entered."""
     waited, fps = len(lead) - 1, forest.graph.database.fps
     inside = {}
     for node in range(1, len(tree.node_clusters)):
-        way = [*lead[:-1], *tree.frames_to(node).tolist()]
-        state = along(forest, way, place)[-1]
-        late = tree.steps[tree.node_visits[node]] + waited >= window.least_s * fps - 1e-6
+        entering = [*lead[:-1], *tree.frames_to(node).tolist()]
+        state = along(forest, entering, place)[-1]
+        late = tree.steps[tree.node_visits[node]] + waited >= window.earliest_s * fps - 1e-6
         if late and (window.area is None or window.area.contains(state[None, :2])[0]):
             inside[node] = state
     parents = {int(tree.node_parents[node]) for node in inside}
     return {node: state for node, state in inside.items() if node not in parents}
 
 
-def told(
+def frames_and_states(
     forest: ClusterForest,
     tree: ClusterTree,
     node: int,
     lead: list[int],
     place: npt.ArrayLike,
-    window: ChoiceWindow,
+    window: ActionWindow,
     most: int,
 ) -> tuple[list[int], list[FloatArray]]:
     """Frames of a leaf's action from the avatar's own, and their planar states."""
     left = most - (len(lead) - 1)
-    least = window.least_s * forest.graph.database.fps - 1e-6
+    least = window.earliest_s * forest.graph.database.fps - 1e-6
     probable = forest.likeliest_motion(tree, node, left / forest.graph.database.fps).frames
-    for way in (probable.tolist(), tree.frames_to(node).tolist()):
-        frames = [*lead[:-1], *stay(forest, way, left)]
+    for entering in (probable.tolist(), tree.frames_to(node).tolist()):
+        frames = [*lead[:-1], *stay(forest, entering, left)]
         states = along(forest, frames, place)
-        entered = len(lead) - 1 + len(way) - 1
+        entered = len(lead) - 1 + len(entering) - 1
         ends = [
             k
             for k in range(len(frames))
@@ -101,7 +101,7 @@ def within(
     forest: ClusterForest,
     lead: list[int],
     place: npt.ArrayLike,
-    window: ChoiceWindow,
+    window: ActionWindow,
     most: int,
     last: bool,
 ) -> list[tuple[list[int], FloatArray]]:
@@ -114,30 +114,30 @@ def within(
     best = max(left, key=lambda node: float(tree.log_probabilities[tree.node_visits[node]]))
     offered: list[tuple[list[int], FloatArray]] = []
     ends: list[tuple[FloatArray, int]] = []
-    for _ in range(3 * window.wanted):
-        frames, states = told(forest, tree, best, lead, place, window, most)
+    for _ in range(3 * window.count):
+        frames, states = frames_and_states(forest, tree, best, lead, place, window, most)
         own = int(clusters[best])
         del left[best]
         if all(distance(forest, states[-1], end, own, c) >= ALIKE_M for end, c in ends):
             offered.append((frames, np.array(states)))
             ends.append((states[-1], own))
-        apart = {
+        distances = {
             node: min(distance(forest, state, end, int(clusters[node]), c) for end, c in ends)
             for node, state in left.items()
         }
-        best = max(apart, key=lambda node: apart[node], default=-1)
-        if len(offered) == window.wanted or best < 0 or apart[best] < ALIKE_M:
+        best = max(distances, key=lambda node: distances[node], default=-1)
+        if len(offered) == window.count or best < 0 or distances[best] < ALIKE_M:
             break
     return offered
 
 
-def choices(
-    forest: ClusterForest, frame: int, place: npt.ArrayLike, window: ChoiceWindow
+def offer_actions(
+    forest: ClusterForest, frame: int, place: npt.ArrayLike, window: ActionWindow
 ) -> list[tuple[list[int], FloatArray]]:
     """Frames of each action from the avatar's own, and their planar states (s, 4)."""
     lead, fps = forest.frames_to_branch(frame).tolist(), forest.graph.database.fps
-    bounds = [] if window.most_s is None else [window.most_s]
-    if window.most_s is None:
+    bounds = [] if window.latest_s is None else [window.latest_s]
+    if window.latest_s is None:
         longest, bound = forest.time_bound_s + (len(lead) - 1) / fps, NEAR_S
         while bound < longest:
             bounds.append(bound)
@@ -150,6 +150,6 @@ def choices(
             last = bound == bounds[-1]
             found = within(forest, lead, place, window, most, last)
             offered = found or offered
-        if len(offered) >= min(window.wanted, ENOUGH):
+        if len(offered) >= min(window.count, ENOUGH):
             break
     return offered

@@ -1,1 +1,1 @@
-"""Control by choice."""
+"""Control by choice: the user picks one of a few offered actions."""

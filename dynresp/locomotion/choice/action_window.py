@@ -1,4 +1,7 @@
-"""Where and when the actions may end that a user is offered (Lee et al. 2002, figure 6)."""
+"""Limits on the actions that a user is offered: how many, when and where (Lee et al. 2002, fig. 6).
+
+A window in time and an area of the ground select the actions of control by choice.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,10 @@ from dynresp.support.errors import UsageError
 
 
 class Area(Protocol):
-    """A piece of ground."""
+    """An area of the ground."""
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """(k,) which of the points (k, 2) [m] lie in it."""
+        """(k,) which of the points (k, 2) [m] are inside."""
         ...
 
 
@@ -29,7 +32,7 @@ class Disc:
     radius: float
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """(k,) which of the points (k, 2) [m] lie in it."""
+        """(k,) which of the points (k, 2) [m] are inside."""
         inside: BoolArray = np.hypot(points[:, 0] - self.x, points[:, 1] - self.y) <= self.radius
         return inside
 
@@ -42,37 +45,38 @@ class Box:
     high: tuple[float, float]
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """(k,) which of the points (k, 2) [m] lie in it."""
+        """(k,) which of the points (k, 2) [m] are inside."""
         inside: BoolArray = np.all((points >= self.low) & (points <= self.high), axis=1)
         return inside
 
 
 @dataclass(frozen=True)
-class ChoiceWindow:
+class ActionWindow:
     """Which actions are offered.
 
     Attributes:
-        wanted: How many; the paper offers three or four.
-        least_s: Soonest that an action may begin to be what it is, its cluster entered [s].
-        most_s: Latest that it may end [s]. None for 4 s, and where fewer than three actions are
-            found so near, half as far again and again, up to the whole tree.
+        count: How many, at least 1; the paper offers three or four.
+        earliest_s: Soonest time at which an action may enter its cluster, at least 0 [s].
+        latest_s: Latest time at which it may end, above `earliest_s` [s]. None starts with 4 s and
+            extends that by half, up to the whole tree, until three actions are found.
         area: Where it may end, in the world; None for anywhere.
+
+    Raises:
+        UsageError: A number is out of range.
     """
 
-    wanted: int = 4
-    least_s: float = 0.3
-    most_s: float | None = None
+    count: int = 4
+    earliest_s: float = 0.3
+    latest_s: float | None = None
     area: Area | None = None
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            UsageError: They make no sense.
-        """
-        if self.wanted < 1:
-            raise UsageError(f"wanted must be 1 or more, got {self.wanted}")
-        if not 0.0 <= self.least_s < np.inf:
-            raise UsageError(f"least_s must be 0 or more, got {self.least_s}")
-        if self.most_s is not None and not self.least_s < self.most_s < np.inf:
-            raise UsageError(f"most_s must be above least_s = {self.least_s}, got {self.most_s}")
+        """Check the numbers."""
+        if self.count < 1:
+            raise UsageError(f"count must be 1 or more, got {self.count}")
+        if not 0.0 <= self.earliest_s < np.inf:
+            raise UsageError(f"earliest_s must be 0 or more, got {self.earliest_s}")
+        if self.latest_s is not None and not self.earliest_s < self.latest_s < np.inf:
+            raise UsageError(
+                f"latest_s must be above earliest_s = {self.earliest_s}, got {self.latest_s}"
+            )

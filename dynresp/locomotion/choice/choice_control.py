@@ -1,4 +1,4 @@
-"""The avatar under control by choice: it acts as chosen, or walks on (Lee et al. 2002, 5.1)."""
+"""Play the action that a user chose, else a random walk (Lee et al. 2002, section 5.1)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from dynresp.support.errors import UsageError
 
 
 class ChoiceControl:
-    """Frames to play: of the action that was chosen, and otherwise by probability.
+    """The frames that an avatar plays: those of the chosen action, else of a random walk.
 
     Attributes:
-        frame: The frame it is at.
+        frame: The avatar's frame.
     """
 
     def __init__(self, graph: MotionGraph, frame: int, rng: np.random.Generator) -> None:
-        """Begin at a frame.
+        """Start at a frame.
 
         Raises:
             UsageError: The frame is not in the graph's component.
@@ -35,37 +35,37 @@ class ChoiceControl:
         """Whether frames of a chosen action are still to come."""
         return len(self._chosen) > 0
 
-    def take(self, choice: OfferedAction) -> None:
-        """Do this from now on; it replaces what was chosen before.
+    def take(self, action: OfferedAction) -> None:
+        """Play an action from now on, in place of the one before.
 
         Args:
-            choice: Offered at the frame at hand, or a little earlier while the avatar has gone
-                along its way.
+            action: Offered at the avatar's frame, or shortly before if the avatar has stayed on the
+                frames of the action since then.
 
         Raises:
-            UsageError: The avatar is not on the way of the action.
+            UsageError: The avatar's frame is not one of the action.
         """
-        way = np.concatenate([[choice.start], choice.frames])
-        at = np.flatnonzero(way == self.frame)
+        frames = np.concatenate([[action.start], action.frames])
+        at = np.flatnonzero(frames == self.frame)
         if len(at) == 0:
             raise UsageError(
-                f"the action begins at frame {choice.start} and does not come through frame "
-                f"{self.frame}, where the avatar is; ask for choices at that frame"
+                f"the action starts at frame {action.start} and does not contain frame "
+                f"{self.frame}, where the avatar is; call offer_actions for that frame"
             )
-        self._chosen = choice.frames[at[0] :]
+        self._chosen = action.frames[at[0] :]
 
     def advance(self, frames: int) -> IntArray:
         """The next frames to play, (frames,).
 
         Raises:
-            UsageError: No frame was asked for.
+            UsageError: `frames` is below 1.
         """
         if frames < 1:
             raise UsageError(f"an avatar advances by at least 1 frame, got {frames}")
         played, self._chosen = self._chosen[:frames], self._chosen[frames:]
         if len(played) < frames:
             last = int(played[-1]) if len(played) else self.frame
-            on = random_walk(self._graph, frames - len(played), self._rng, start=last)
-            played = np.concatenate([played, on])
+            walk = random_walk(self._graph, frames - len(played), self._rng, start=last)
+            played = np.concatenate([played, walk])
         self.frame = int(played[-1])
         return played

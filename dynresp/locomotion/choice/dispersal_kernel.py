@@ -1,4 +1,4 @@
-"""The compiled step of dispersing: how near candidates are to what is offered, and the farthest.
+"""Compiled step of `dynresp.locomotion.choice.actions`: the candidate least like all offers so far.
 
 Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
 is used.
@@ -7,6 +7,7 @@ is used.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from numba import types
 
@@ -14,33 +15,50 @@ from dynresp.support.compiling import compiled
 
 _INTS = types.Array(types.int32, 1, "C", readonly=True)
 _TABLE = types.Array(types.float64, 2, "C", readonly=True)
-_SIGNATURE = types.int64(
-    _TABLE, _INTS, _TABLE, types.float64[::1], types.int64, types.float64, types.float64[::1]
+
+
+class Candidates(NamedTuple):
+    """Where the actions end that may be offered. Read-only.
+
+    Attributes:
+        states: (k, 4) planar states of the root at their ends [m, rad].
+        clusters: (k,) int32, their clusters.
+        squared_distances: (K, K) of the clusters' means.
+    """
+
+    states: Any
+    clusters: Any
+    squared_distances: Any
+
+
+_CANDIDATES = types.NamedTuple((_TABLE, _INTS, _TABLE), Candidates)
+
+
+@compiled(
+    types.int64(_CANDIDATES, types.float64[::1], types.int64, types.float64, types.float64[::1]),
+    error_model="numpy",
 )
-
-
-@compiled(_SIGNATURE, error_model="numpy")
-def farthest_kernel(places, clusters, apart, end, cluster, turned, nearest):
-    """Bring distances to the nearest action up to date with one more.
+def least_alike_kernel(candidates, end, cluster, turn_m, nearest):
+    """Update the distances to the nearest offered action with one more action.
 
     Args:
-        places: (k, 4) planar states where candidates end [m, rad].
-        clusters: (k,) of the candidates.
-        apart: (K, K) squared distances of clusters.
-        end: (4,) planar state where the further action ends.
+        candidates: The actions that may be offered.
+        end: (4,) planar state where the additional action ends.
         cluster: Its cluster.
-        turned: What facing the other way counts for [m].
-        nearest: In and out, (k,) distance to the nearest action.
+        turn_m: Distance that facing the opposite way counts as [m].
+        nearest: In and out, (k,) distance of each candidate to the nearest offered action.
 
     Returns:
         The first of the candidates whose distance is the greatest.
     """
     best = 0
+    states, clusters = candidates.states, candidates.clusters
     for k in range(len(clusters)):
-        x, y = places[k, 0] - end[0], places[k, 1] - end[1]
-        # Half a circle's chord, from one heading to the other.
-        chord = turned * math.sin(0.5 * (places[k, 3] - end[3]))
-        squared = x * x + y * y + chord * chord + apart[clusters[k], cluster]
+        x, y = states[k, 0] - end[0], states[k, 1] - end[1]
+        # Half of the circle's chord from one heading to the other.
+        chord = turn_m * math.sin(0.5 * (states[k, 3] - end[3]))
+        squared = x * x + y * y + chord * chord
+        squared += candidates.squared_distances[clusters[k], cluster]
         nearest[k] = min(nearest[k], math.sqrt(squared))
         if nearest[k] > nearest[best]:
             best = k

@@ -202,20 +202,19 @@ class ClusterForest:
 
         root = int(self.frames_to_branch(frame)[-1])
         n = len(self.graph.database)
-        room = {name: np.empty(n, dtype=np.int32) for name in TreeArrays._fields}
-        room["log_probabilities"] = np.empty(n)
-        arrays = TreeArrays(**room)
+        frames, parents, edges, steps, nodes = (np.empty(n, dtype=np.int32) for _ in range(5))
+        of_nodes = [np.empty(n, dtype=np.int32) for _ in range(3)]
+        logs = np.empty(n)
+        arrays = TreeArrays(frames, parents, edges, steps, nodes, logs, *of_nodes)
         depth = self.steps_within(time_bound_s)
-        visits, nodes = grow_kernel(self._edges, self.clusters.labels, root, depth, arrays)
-        arrays.edges[1:visits] = self._followed[arrays.edges[1:visits]]
+        visits, size = grow_kernel(self._edges, self.clusters.labels, root, depth, arrays)
+        edges[1:visits] = self._followed[edges[1:visits]]
         for array in arrays:
             array.flags.writeable = False
         return ClusterTree(
-            **{
-                name: array[: nodes if name.startswith("node_") else visits]
-                for name, array in room.items()
-            }
-        )
+            frames[:visits], parents[:visits], edges[:visits], steps[:visits], nodes[:visits],
+            logs[:visits], *(array[:size] for array in of_nodes),
+        )  # fmt: skip
 
     def root_states(
         self,

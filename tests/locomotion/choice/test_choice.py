@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.locomotion.choice.action_window import Box, ChoiceWindow, Disc
-from dynresp.locomotion.choice.actions import OfferedAction, choices
+from dynresp.locomotion.choice.action_window import ActionWindow, Box, Disc
+from dynresp.locomotion.choice.actions import OfferedAction, offer_actions
 from dynresp.locomotion.choice.choice_control import ChoiceControl
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.clusters.frame_clusters import Clusters
@@ -49,14 +49,14 @@ def end_of(choice: OfferedAction) -> tuple[float, ...]:
 def check(forest: ClusterForest, frame: int, offered: tuple[OfferedAction, ...]) -> None:
     """What every set of choices keeps to."""
     graph, clusters = forest.graph, forest.clusters
-    ways = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
+    edges = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
     for choice in offered:
         walk = [frame, *choice.frames.tolist()]
         assert choice.start == frame
-        assert set(itertools.pairwise(walk)) <= ways
+        assert set(itertools.pairwise(walk)) <= edges
         assert choice.path.shape == (len(walk), 4)
         np.testing.assert_array_equal(
-            clusters.labels[choice.frames[choice.enters :]], choice.cluster
+            clusters.labels[choice.frames[choice.entry :]], choice.cluster
         )
         assert choice.example == clusters.examples[choice.cluster]
         assert choice.log_probability <= 0.0
@@ -66,7 +66,7 @@ def check(forest: ClusterForest, frame: int, offered: tuple[OfferedAction, ...])
 def test_choices_are_different_and_can_be_walked(made: ClusterForest) -> None:
     counts = []
     for frame in moments(made, 100):
-        offered = choices(made, frame, PLACE)
+        offered = offer_actions(made, frame, PLACE)
         check(made, frame, offered)
         counts.append(len(offered))
     assert min(counts) >= 3
@@ -85,12 +85,12 @@ def test_choices_are_the_slow_ones(kind: str, seed: int) -> None:
         planar = forest.graph.database.planar[frame]
         x, y = placement.compose(PLACE, planar)[:2]
         window = {
-            "usual": ChoiceWindow(),
-            "soon": ChoiceWindow(wanted=6, least_s=0.5, most_s=2.5),
-            "here": ChoiceWindow(area=Disc(x, y, 1.0)),
+            "usual": ActionWindow(),
+            "soon": ActionWindow(count=6, earliest_s=0.5, latest_s=2.5),
+            "here": ActionWindow(area=Disc(x, y, 1.0)),
         }[kind]
-        offered = choices(forest, frame, PLACE, window)
-        expected = slow.choices(forest, frame, PLACE, window)
+        offered = offer_actions(forest, frame, PLACE, window)
+        expected = slow.offer_actions(forest, frame, PLACE, window)
         assert [[frame, *c.frames.tolist()] for c in offered] == [frames for frames, _ in expected]
         for choice, (_, states) in zip(offered, expected, strict=True):
             np.testing.assert_allclose(choice.path[:, :3], states[:, :3], atol=1e-9)
@@ -98,25 +98,25 @@ def test_choices_are_the_slow_ones(kind: str, seed: int) -> None:
             np.testing.assert_allclose(turned, 0.0, atol=1e-9)
 
 
-def test_as_many_as_wanted_are_offered(made: ClusterForest) -> None:
+def test_as_many_as_the_window_says_are_offered(made: ClusterForest) -> None:
     frame = int(made.graph.frames[20])
-    for wanted in (1, 2, 6):
-        assert len(choices(made, frame, PLACE, ChoiceWindow(wanted=wanted))) == wanted
+    for count in (1, 2, 6):
+        assert len(offer_actions(made, frame, PLACE, ActionWindow(count=count))) == count
 
 
 def test_they_are_the_same_every_time(made: ClusterForest) -> None:
     frame = int(made.graph.frames[33])
-    first, again = (choices(made, frame, PLACE) for _ in range(2))
+    first, again = (offer_actions(made, frame, PLACE) for _ in range(2))
     assert [c.frames.tolist() for c in first] == [c.frames.tolist() for c in again]
 
 
 def test_the_window_in_time_is_kept(made: ClusterForest) -> None:
     some = 0
     for frame in moments(made, 60):
-        offered = choices(made, frame, PLACE, ChoiceWindow(least_s=1.0, most_s=2.0))
+        offered = offer_actions(made, frame, PLACE, ActionWindow(earliest_s=1.0, latest_s=2.0))
         check(made, frame, offered)
         for choice in offered:
-            assert choice.enters + 1 >= 15
+            assert choice.entry + 1 >= 15
             assert len(choice.frames) <= 30
         some += len(offered)
     assert some > 0
@@ -128,7 +128,7 @@ def test_the_window_in_space_is_kept(kind: str, made: ClusterForest) -> None:
     for frame in moments(made, 60):
         x, y = placement.compose(PLACE, made.graph.database.planar[frame])[:2]
         area = Disc(x, y + 0.5, 0.5) if kind == "disc" else Box((x, y), (x + 1.0, y + 1.0))
-        offered = choices(made, frame, PLACE, ChoiceWindow(area=area))
+        offered = offer_actions(made, frame, PLACE, ActionWindow(area=area))
         check(made, frame, offered)
         for choice in offered:
             assert area.contains(choice.path[-1:, :2]).all()
@@ -137,13 +137,13 @@ def test_the_window_in_space_is_kept(kind: str, made: ClusterForest) -> None:
 
 
 def test_nothing_is_offered_out_of_reach(made: ClusterForest) -> None:
-    window = ChoiceWindow(area=Disc(1000.0, 0.0, 1.0))
-    assert choices(made, int(made.graph.frames[0]), PLACE, window) == ()
+    window = ActionWindow(area=Disc(1000.0, 0.0, 1.0))
+    assert offer_actions(made, int(made.graph.frames[0]), PLACE, window) == ()
 
 
 def test_the_path_is_where_the_avatar_will_be(walking: ClusterForest) -> None:
     for frame in moments(walking, 20):
-        for choice in choices(walking, frame, PLACE):
+        for choice in offer_actions(walking, frame, PLACE):
             played = Playback(walking.graph, frame, PLACE).play(choice.frames)
             planar = walking.graph.database.planar[choice.frames]
             expected = placement.compose(played.placements, planar)
@@ -152,7 +152,7 @@ def test_the_path_is_where_the_avatar_will_be(walking: ClusterForest) -> None:
 
 def test_the_pose_stands_where_the_action_ends(walking: ClusterForest) -> None:
     frame = int(walking.graph.frames[4])
-    for choice in choices(walking, frame, PLACE):
+    for choice in offer_actions(walking, frame, PLACE):
         shown = placement.of_poses(choice.pose[None])[0]
         example = walking.graph.database.planar[choice.example]
         np.testing.assert_allclose(shown[:2], choice.path[-1, :2], atol=1e-9)
@@ -168,7 +168,7 @@ def test_in_fixed_coordinates_the_pose_stands_where_it_was_recorded() -> None:
         clusters=10,
         coordinates=Coordinates.FIXED,
     )
-    offered = choices(forest, int(forest.graph.frames[7]))
+    offered = offer_actions(forest, int(forest.graph.frames[7]))
     assert offered
     for choice in offered:
         np.testing.assert_array_equal(choice.pose, forest.graph.database.poses[choice.example])
@@ -176,21 +176,21 @@ def test_in_fixed_coordinates_the_pose_stands_where_it_was_recorded() -> None:
 
 def test_a_frame_outside_the_graph_is_refused(made: ClusterForest) -> None:
     with pytest.raises(UsageError, match="not in the graph"):
-        choices(made, 10**6)
+        offer_actions(made, 10**6)
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("wanted", 0), ("least_s", -1.0), ("most_s", 0.1), ("most_s", np.nan)]
+    ("name", "value"), [("count", 0), ("earliest_s", -1.0), ("latest_s", 0.1), ("latest_s", np.nan)]
 )
-def test_windows_that_make_no_sense_are_refused(name: str, value: float) -> None:
+def test_windows_out_of_range_are_refused(name: str, value: float) -> None:
     with pytest.raises(UsageError, match=name):
-        ChoiceWindow(**{name: value})  # type: ignore[arg-type]
+        ActionWindow(**{name: value})  # type: ignore[arg-type]
 
 
 def test_the_avatar_does_what_was_chosen_and_then_walks_on(made: ClusterForest) -> None:
     frame = int(made.graph.frames[10])
     control = ChoiceControl(made.graph, frame, np.random.default_rng(0))
-    choice = choices(made, frame)[1]
+    choice = offer_actions(made, frame)[1]
     control.take(choice)
     assert control.is_acting
     played = [control.advance(2) for _ in range(len(choice.frames))]
@@ -199,25 +199,25 @@ def test_the_avatar_does_what_was_chosen_and_then_walks_on(made: ClusterForest) 
     assert not control.is_acting
     assert control.frame == walk[-1]
     graph = made.graph
-    ways = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
-    assert set(itertools.pairwise(walk.tolist())) <= ways
+    edges = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
+    assert set(itertools.pairwise(walk.tolist())) <= edges
 
 
 def test_a_choice_can_be_taken_a_little_late(made: ClusterForest) -> None:
     frame = int(made.graph.frames[10])
-    choice = choices(made, frame)[0]
+    choice = offer_actions(made, frame)[0]
     control = ChoiceControl(made.graph, int(choice.frames[1]), np.random.default_rng(0))
     control.take(choice)
     np.testing.assert_array_equal(control.advance(1), choice.frames[2:3])
 
 
 def test_a_choice_offered_elsewhere_is_refused(made: ClusterForest) -> None:
-    choice = choices(made, int(made.graph.frames[10]))[0]
+    choice = offer_actions(made, int(made.graph.frames[10]))[0]
     elsewhere = next(
         int(f) for f in made.graph.frames if f not in choice.frames and f != choice.start
     )
     control = ChoiceControl(made.graph, elsewhere, np.random.default_rng(0))
-    with pytest.raises(UsageError, match="ask for choices"):
+    with pytest.raises(UsageError, match="call offer_actions"):
         control.take(choice)
     with pytest.raises(UsageError, match="at least 1 frame"):
         control.advance(0)
@@ -232,5 +232,5 @@ def test_three_at_ten_thousand_moments(
     graph = planned_graph(plan, motions_folder, character)
     forest = ClusterForest(graph, Clusters.of(graph))
     walk = random_walk(graph, 10_000, np.random.default_rng(1))
-    offered = (choices(forest, frame) for frame in walk.tolist())
+    offered = (offer_actions(forest, frame) for frame in walk.tolist())
     assert min(len({end_of(choice) for choice in some}) for some in offered) >= 3
