@@ -161,3 +161,9 @@ def test_the_site_shows_the_three_line_start() -> None:
     start = 'dynresp.hit("builtin:walk", dynresp.Ball(time=1.5, mass=6, speed=8, from_deg=180))'
     for document in ("README.md", "docs/index.md"):
         assert start in (ROOT / document).read_text(encoding="utf-8")
+
+
+def test_everybody_runs_the_tests_of_the_readme() -> None:
+    (words,) = re.findall(r"\.venv/bin/(pytest.*)", (ROOT / "README.md").read_text("utf-8"))
+    assert words.removeprefix("pytest") in (ROOT / ".ci" / "run").read_text("utf-8")
+    assert words in (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")

@@ -29,9 +29,7 @@ sys.meta_path.insert(0, Block())
 """Program text that makes the optional packages as good as not installed."""
 
 ON_A_DASK_WORKER = "make_on_worker"
-STUDIES = {"filming.py", "video.py"}
-"""Modules in `bench` that only this project's own studies import."""
-
+"""The function that Dask runs on its workers, where Dask is installed."""
 COMMAND = BLOCK + "from dynresp.cli import main; sys.exit(main())"
 
 
@@ -105,8 +103,6 @@ def test_optional_packages_are_required_before_they_are_imported() -> None:
     for file in sorted((ROOT / "dynresp").rglob("*.py")):
         tree = ast.parse(file.read_text(encoding="utf-8"))
         where = file.relative_to(ROOT)
-        if file.parent.name == "bench" and file.name in STUDIES:
-            continue
         wrong += [f"{where}:{line.lineno} at the top" for line in optional_imports(tree)]
         for function in functions(tree):
             if not optional_imports(function):
