@@ -79,8 +79,8 @@ class Character:
             model_file: An MJCF file with a free root and 13 ball joints; the product's by default.
 
         Raises:
-            MotionError: The model cannot be read, has not the degrees of freedom of the character,
-                or has body frames that do not sit unturned at their joints.
+            MotionError: The model cannot be read, does not have the degrees of freedom of the
+                character, or has body frames that are turned or away from their joints.
         """
         self.file = file = model_file or paths.models_folder() / "ragdoll.xml"
         try:
@@ -213,7 +213,7 @@ def _mirror_permutation(names: tuple[str, ...]) -> npt.NDArray[np.intp]:
 
 
 def _check_layout(file: Path, model: mujoco.MjModel) -> None:
-    """Refuse a model whose poses are not laid out as this module takes them to be."""
+    """Refuse a model whose poses are not in the layout that this module assumes."""
     free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
     if model.jnt_type.tolist() != [free] + [ball] * 13 or model.nbody != 15:
         raise MotionError(
@@ -235,7 +235,7 @@ def _check_layout(file: Path, model: mujoco.MjModel) -> None:
 
 
 def _contents(model: mujoco.MjModel) -> bytes:
-    """What makes a character itself: its tree, sizes and masses.
+    """What identifies a character: its tree, sizes and masses.
 
     Rounded, since the model compiler's last digits may differ from machine to machine.
     """

@@ -2,7 +2,7 @@
 
 BVH. One joint for each of the character's 14 bodies, named as in the model, with OFFSETs of the
 rest pose; End Sites at the top of the head, the finger tips and the toes. Lengths are in metres,
-so that Blender, whose BVH import neither scales nor asks, shows the character life-size (in
+so that Blender, whose BVH import does not scale, shows the character life-size (in
 programs that count in centimetres, import at a scale of 100). +Y is up and the character faces +Z
 at rest, its left being +X: the custom of BVH, which Blender turns to its own Z up. The root's
 OFFSET is zero and its position channels say where the pelvis is, so that readers which add the two
@@ -35,7 +35,6 @@ _LEFT_UP_FORWARD = [1, 2, 0]
 _DIGITS = 6
 # Below this length the direction of a pair of numbers is noise: the pose is at a gimbal's pole.
 _NO_DIRECTION = 1e-9
-# Zip archives cannot be older; any fixed time would do.
 
 
 def write_npz(motion: Motion, path: str | Path, character: Character) -> None:
@@ -103,7 +102,7 @@ def zxy_angles(quaternions: npt.ArrayLike) -> FloatArray:
     Half the sum and half the difference of a and c are the directions of (w + x, y + z) and
     (w - x, z - y), and b follows from the lengths of the two, as multiplying the three half-angle
     quaternions out shows. At a pole one of the lengths is zero and its direction, which then
-    matters to nobody, stays what it was. Nothing loses digits on the way there, and passing
+    does not matter, stays what it was. Nothing loses digits on the way there, and passing
     through a pole is a change of that length's sign.
 
     Args:

@@ -1,4 +1,4 @@
-"""Where bodies and the ground meet: heights above the floor, and foot contacts.
+"""Heights of bodies above the floor, and foot contacts.
 
 The floor is the plane z = 0.
 """

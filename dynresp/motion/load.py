@@ -1,4 +1,4 @@
-"""One front door for motions: a file of any kind in, a motion of the character out."""
+"""Loading motions: a file of any format in, a motion of the character out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _Stamps: TypeAlias = tuple[tuple[str, int, int], ...]
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """What to tell the reader of a file, and what to do with its motion.
+    """How to read a motion file, and what to do with its motion.
 
     Attributes:
         unit: Metres per unit of the file; None finds it.
@@ -46,7 +46,7 @@ class LoadOptions:
 def load_motion(
     path: Path | str, character: Character | None = None, options: LoadOptions | None = None
 ) -> Motion:
-    """Read a motion file, lay it onto the character and set it on the floor.
+    """Read a motion file, carry it over to the character and set it on the floor.
 
     A file that has been loaded is kept in memory and read again only when it, or the skeleton
     of an AMC file, has changed.
@@ -54,7 +54,7 @@ def load_motion(
     Args:
         path: A BVH, AMC, DeepMimic or .npz file.
         character: The character, by default the product's.
-        options: What to tell the reader, and what to do.
+        options: How to read it, and what to do with the motion.
 
     Returns:
         The motion, at the file's frame rate.
@@ -75,11 +75,11 @@ def load_motion(
 
 
 def _stamps(path: Path, asf: Path | None) -> _Stamps:
-    """What changes with the motion file and with every skeleton that an AMC file may take.
+    """Paths, times and sizes of the motion file and of each skeleton that an AMC file may take.
 
     Args:
         path: The motion file, resolved.
-        asf: The skeleton that was told, resolved.
+        asf: The skeleton that was given, resolved.
 
     Raises:
         OSError: The motion file is not there.
@@ -96,7 +96,7 @@ def _stamps(path: Path, asf: Path | None) -> _Stamps:
         try:
             found = file.stat()
         except OSError:
-            # That a skeleton is missing is the reader's to say.
+            # The reader reports a skeleton that is missing.
             if file is path:
                 raise
             continue
@@ -106,12 +106,12 @@ def _stamps(path: Path, asf: Path | None) -> _Stamps:
 
 @functools.lru_cache(maxsize=_KEPT)
 def _load(path: Path, stamps: _Stamps, character: Character, options: LoadOptions) -> Motion:
-    # The stamps are part of the cache's key alone.
+    # The stamps are only part of the cache's key.
     del stamps
     if path.suffix.lower() == ".npz":
         if (options.unit, options.up, options.fps, options.asf) != (None, None, None, None):
             raise MotionFileError(
-                f"{path}: an .npz file states its unit, axes and frame rate; do not tell them"
+                f"{path}: an .npz file states its unit, axes and frame rate; leave them out"
             )
         motion = read_npz(path, character)
     else:

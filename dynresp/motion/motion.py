@@ -44,7 +44,7 @@ class Motion:
         poses: (frames, 59) rows of `qpos` (see `dynresp.motion.character`), quaternions w x y z,
             unit length and continuous in sign; metres, Z up.
         fps: Frames per second; frame k is at time k / fps.
-        name: Where it comes from, for people.
+        name: Where it comes from, for users to read.
         contacts: (frames, 2) whether the left and the right foot stand on the ground.
         labels: Named ranges of frames.
 
@@ -69,10 +69,10 @@ class Motion:
             raise MotionError(
                 f"motion {self.name!r} has a number that is not finite (frame {frame})"
             )
-        farthest = float(np.max(np.abs(poses[:, ROOT])))
-        if farthest > _MAX_DISTANCE:
+        distance = float(np.max(np.abs(poses[:, ROOT])))
+        if distance > _MAX_DISTANCE:
             raise MotionError(
-                f"motion {self.name!r} goes {farthest:g} m far; "
+                f"motion {self.name!r} goes {distance:g} m away; "
                 f"its root must stay within {_MAX_DISTANCE:g} m of the origin"
             )
         _check_rate(self.fps)
@@ -151,7 +151,7 @@ class Motion:
             (n, 59).
         """
         at = np.clip(np.asarray(times, dtype=np.float64) * self.fps, 0.0, len(self) - 1.0)
-        # A time that is a frame but for rounding is that frame: resampling is then exact.
+        # A time within rounding of a frame is that frame: resampling is then exact.
         at = np.where(np.abs(at - np.round(at)) < 1e-9, np.round(at), at)
         low = np.minimum(at.astype(np.intp), max(len(self) - 2, 0))
         high = np.minimum(low + 1, len(self) - 1)
@@ -211,10 +211,10 @@ class Motion:
         """Moved on the ground so that at one frame the pelvis is over (x, y) [m], facing yaw [rad].
 
         Args:
-            x: Where the pelvis comes to be [m].
-            y: Where the pelvis comes to be [m].
+            x: Where the pelvis is then [m].
+            y: Where the pelvis is then [m].
             yaw: How it faces (`rotations.yaw_of`) [rad].
-            frame: The frame at which it does; -1 is the last.
+            frame: At which frame; -1 is the last.
 
         Raises:
             MotionError: There is no such frame.
@@ -258,25 +258,25 @@ def interpolate(a: FloatArray, b: FloatArray, t: npt.ArrayLike) -> FloatArray:
     return out
 
 
-def interpolate_moving(
+def interpolate_with_velocities(
     a: FloatArray,
     b: FloatArray,
-    moving_a: FloatArray,
-    moving_b: FloatArray,
+    velocities_a: FloatArray,
+    velocities_b: FloatArray,
     t: npt.ArrayLike,
     seconds: float,
 ) -> FloatArray:
     """Poses between a and b that begin and end with given velocities: cubics.
 
-    Where poses are far apart in time, straight lines and slerp would gather all changes of speed in
-    them. Rotations go along cubics of rotation vectors from a, whose slope at b is the angular
+    Where poses are far apart in time, straight lines and slerp would change speed only at the
+    poses. Rotations go along cubics of rotation vectors from a, whose slope at b is the angular
     velocity to first order in how far they turn.
 
     Args:
         a: Poses at t = 0, (frames, 59).
         b: Poses at t = 1, as many.
-        moving_a: Rows of `qvel` (frames, 45) at a; see `Motion.velocities`.
-        moving_b: Those at b.
+        velocities_a: Rows of `qvel` (frames, 45) at a; see `Motion.velocities`.
+        velocities_b: Those at b.
         t: (frames,) or a number, 0 to 1.
         seconds: Time from a to b [s].
     """
@@ -287,18 +287,18 @@ def interpolate_moving(
     out[:, ROOT] = (
         a[:, ROOT]
         + rise * (b[:, ROOT] - a[:, ROOT])
-        + begin * moving_a[:, ROOT]
-        + end * moving_b[:, ROOT]
+        + begin * velocities_a[:, ROOT]
+        + end * velocities_b[:, ROOT]
     )
     qa, qb = (x[:, 3:].reshape(len(a), -1, 4) for x in (a, b))
     turn = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(qa), qb))
-    rates = begin[..., None] * moving_a[:, 3:].reshape(turn.shape)
-    rates += end[..., None] * moving_b[:, 3:].reshape(turn.shape)
-    way = rotations.from_rotation_vector(rise[..., None] * turn + rates)
+    rates = begin[..., None] * velocities_a[:, 3:].reshape(turn.shape)
+    rates += end[..., None] * velocities_b[:, 3:].reshape(turn.shape)
+    turned = rotations.from_rotation_vector(rise[..., None] * turn + rates)
     # Exactly a and b at the two ends.
-    met = rotations.multiply(qa, way)
-    met = np.where(s[..., None] >= 1.0, qb, met)
-    out[:, 3:] = met.reshape(len(a), -1)
+    between = rotations.multiply(qa, turned)
+    between = np.where(s[..., None] >= 1.0, qb, between)
+    out[:, 3:] = between.reshape(len(a), -1)
     out[:, ROOT] = np.where(s >= 1.0, b[:, ROOT], out[:, ROOT])
     return out
 

@@ -136,7 +136,7 @@ def yaw_of(q: npt.ArrayLike) -> FloatArray:
 def between_vectors(a: npt.ArrayLike, b: npt.ArrayLike) -> FloatArray:
     """Shortest rotation that turns direction a into direction b; (..., 3), any length but zero.
 
-    For opposite directions any axis across a serves, and one is chosen.
+    For opposite directions any axis perpendicular to a would do; one is chosen.
     """
     start = np.asarray(a, dtype=np.float64)
     stop = np.asarray(b, dtype=np.float64)
@@ -148,7 +148,7 @@ def between_vectors(a: npt.ArrayLike, b: npt.ArrayLike) -> FloatArray:
     length = np.linalg.norm(middle, axis=-1, keepdims=True)
     opposite = length < 1e-15
     bisector = middle / np.where(opposite, 1.0, length)
-    # The coordinate axis that is farthest from a, made perpendicular to it.
+    # The coordinate axis most unlike a, made perpendicular to it.
     other = np.eye(3)[np.argmin(np.abs(start), axis=-1)]
     axis = np.where(opposite, np.cross(start, other), np.cross(bisector, chord))
     return normalize(np.concatenate([np.where(opposite, 0.0, length), axis], axis=-1))

@@ -79,7 +79,7 @@ def test_import_takes_what_it_is_told(world: Path, dynresp: Command) -> None:
     assert read_npz(result.stdout.strip()).fps == 60.0
     result = dynresp("motions", "import", world / "stand.npz", "--unit", 1, "--out", world / "b")
     assert result.exit_code == 2
-    assert "do not tell them" in result.stderr
+    assert "leave them out" in result.stderr
 
 
 @pytest.mark.parametrize("words", [("show",), ("export", "--out", "x"), ("import", "--out", "x")])

@@ -180,7 +180,11 @@ def test_jump_flies_as_things_fall(tmp_path: Path, character: Character) -> None
             'do = "hop", time',
             "turn 3.do: .*step, stay, jump, got 'hop'",
         ),
-        ("time = 0.6, apart", 'foot = "left", apart', "the left foot is to go, but it went last"),
+        (
+            "time = 0.6, apart",
+            'foot = "left", apart',
+            "the left foot steps twice in a row",
+        ),
         ("0.7, at = [0.01, 0.03] },", '0.7 },\n  { do = "step" },', "begins and ends standing"),
         ('"turn"]', '"turn"]\nstart = [0]', "course.start"),
         ("neck = {", "pelvis = { x = 0.1 }, neck = {", "turn 1.posture: balance says where"),

@@ -12,7 +12,7 @@ from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.motion import (
     Label,
     Motion,
-    interpolate_moving,
+    interpolate_with_velocities,
     move_poses,
     pose_velocities,
 )
@@ -299,7 +299,7 @@ class TestInterpolateMoving:
         moving = motion.velocities()
         seconds, tick = 1.0 / motion.fps, 1e-4
         times = np.array([0.0, tick, 1.0 - tick, 1.0])
-        poses = interpolate_moving(
+        poses = interpolate_with_velocities(
             np.repeat(a, 4, axis=0), np.repeat(b, 4, axis=0), np.repeat(moving[3:4], 4, axis=0),
             np.repeat(moving[4:5], 4, axis=0), times, seconds,
         )  # fmt: skip
@@ -318,7 +318,7 @@ class TestInterpolateMoving:
         coarse = fine.resampled(15.0)
         step, part = np.divmod(np.arange(4 * (len(coarse) - 1)), 4)
         moving = coarse.velocities()
-        smooth = interpolate_moving(
+        smooth = interpolate_with_velocities(
             coarse.poses[step], coarse.poses[step + 1], moving[step], moving[step + 1],
             part / 4.0, 1.0 / 15.0,
         )  # fmt: skip

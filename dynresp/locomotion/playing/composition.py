@@ -14,7 +14,7 @@ from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_st
 from dynresp.locomotion.playing.stance_steps import keep_feet_planted
 from dynresp.motion.character import POSE_SIZE, Character
 from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP, ComposedMotion, fit_feet
-from dynresp.motion.motion import Motion, interpolate_moving
+from dynresp.motion.motion import Motion, interpolate_with_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray, IntArray
 from dynresp.support.errors import MotionError
@@ -136,7 +136,7 @@ class StepTimes:
 def interpolate_steps(character: Character, steps: KnotSteps, way: StepTimes) -> FloatArray:
     """Poses (n, 59) among knots, whose feet do not leave them where they stand."""
     at = way.step
-    poses = interpolate_moving(
+    poses = interpolate_with_velocities(
         steps.starts[at], steps.ends[at], steps.moving_starts[at], steps.moving_ends[at], way.part,
         way.seconds,
     )  # fmt: skip

@@ -1,9 +1,9 @@
-"""Motions that this project makes itself from key poses; they stand in for motion capture.
+"""Built-in motions, which dynresp makes itself from key poses, in place of motion capture.
 
-`reactions/builtin/` holds them as TOML files. The way of the data: a file is read and checked
-(`keypose_spec`, `course_spec`), its keys become curves and poses (`keyposes`, `gait` for the walk),
-and the feet are locked where they stand (`footing`). A course is planned step by step first
-(`course_plan`), and balance moves the body over its feet (`course`).
+`reactions/builtin/` holds them as TOML files. A file is read and checked (`keypose_spec`,
+`course_spec`), its keys become curves and poses (`keyposes`, `steady_walk` for the walk), and the
+feet are fixed where they stand (`footing`). A course is planned step by step first (`course_plan`),
+and balance moves the body over its feet (`course`).
 """
 
 from dynresp.motion.builtin.builtin_motions import (

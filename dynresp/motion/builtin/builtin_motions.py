@@ -2,7 +2,7 @@
 
 Each is a file of `reactions/builtin`: a walk from published gait curves, key poses with timing,
 which splines and inverse kinematics turn into motion, and courses, which are planned step by step.
-They stand in until real motion capture is there, and are named "built-in" wherever they appear.
+They take the place of motion capture that is not there, and are named "built-in" everywhere.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from dynresp.motion.builtin.keypose_spec import BuiltinSpec
     from dynresp.motion.rotations import FloatArray
 
-# How often a body that gets up over knees and hands is set onto the ground.
+# How often a body that gets up on knees and hands is set on the ground.
 _SETTLED = 6
 
 PREFIX = "built-in: "
 """How the name of a built-in motion begins."""
 FLAT = ("walk", "stroll", "footwork")
-"""Slugs of those that go about on level ground: enough for a motion graph without any recording."""
+"""Slugs of those that move on level ground: enough for a motion graph without any recording."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class BuiltinInfo:
             follows a fall, "reaction" for the others.
         strategy: Of a reaction, such as "side_fall"; None for a base motion.
         what: What happens in it.
-        source: Where its numbers come from; empty where they were made up by hand.
+        source: Where its numbers come from; empty if they were chosen by hand.
     """
 
     slug: str
@@ -87,8 +87,8 @@ def load_builtin(name: str, character: Character | None = None) -> Motion:
 
     Returns:
         The motion, facing +X at its start, on the floor z = 0 (that about the stool also on the
-        stool), named "built-in: ...", with foot contacts. A reaction bears its strategy as a
-        label; one that is planned step by step bears the names of its phrases, such as "sit".
+        stool), named "built-in: ...", with foot contacts. A reaction has its strategy as a
+        label; one that is planned step by step has the names of its phrases, such as "sit".
 
     Raises:
         UnknownNameError: There is no such built-in motion.
@@ -103,11 +103,11 @@ def make_motion(spec: BuiltinSpec, character: Character) -> Motion:
     name = PREFIX + spec.name
     planned = np.stack([track.locked for track in tracks], axis=1)
     if spec.course is not None:
-        # Not all of its feet stand on the floor z = 0, and where they stand is planned.
+        # Feet do not always stand on the floor z = 0; the plan says where they stand.
         return Motion(poses, spec.fps, name, planned, _phrases(spec.course, spec.fps, len(poses)))
     label = Label(spec.strategy or spec.kind, 0, len(poses))
     if spec.kind == "get_up":
-        # Feet of one who lies touch the floor without standing on it.
+        # The feet of somebody who lies down touch the floor without standing on it.
         return Motion(poses, spec.fps, name, planned, (label,))
     contacts = ground.foot_contacts(character, character.kinematics(poses), spec.fps)
     return Motion(poses, spec.fps, name, contacts, (label,))

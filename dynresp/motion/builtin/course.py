@@ -37,10 +37,10 @@ from dynresp.motion.rotations import FloatArray
 _ROUNDS = 3
 # Standard deviations of the Gaussians that round what the feet and the plan say [s].
 _TURN_S, _ARM_S, _LOAD_S, _POSTURE_S = 0.10, 0.08, 0.07, 0.04
-# The head looks to where the body will face after this time [s], by so much at most [deg].
+# The head turns to where the body will face after this time [s], by at most this [deg].
 _LOOK_S, _LOOK_DEG = 0.4, 40.0
-# A leg that swings is easily stretched to this part of its length, and hardly by as much again; the
-# time over which this is eased in after standing, and out before [s].
+# A swinging leg is stretched to this part of its length, and by less than this beyond it; the time
+# over which this is eased in after standing, and out before [s].
 _EASY, _REST, _REACH_S = 0.985, 0.01, 0.10
 # Ordinary walking [m/s], from which the elbows are bent in full.
 _SPEED = 1.23
@@ -80,7 +80,7 @@ def course_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, l
     _point_knees(channels, tracks)
 
     pressure = _along(plan.pressure, times)
-    # Where the splines of a swift step ask for more, the ground does not pull.
+    # The splines of a fast step may ask for more, but the ground does not pull.
     lift = np.clip(lift, -GRAVITY, GRAVITY)
     offset = np.zeros((len(times), 3))
     offset[:, 2] = 0.07
@@ -133,7 +133,7 @@ def center_of_mass(character: Character, poses: FloatArray) -> FloatArray:
 def _within_reach(
     character: Character, poses: FloatArray, track: FootTrack, side: str, fps: float
 ) -> FootTrack:
-    """The track, drawn towards the hip where it swings farther away than a leg easily reaches."""
+    """The track, moved towards the hip where it swings farther away than a leg reaches well."""
     from scipy.ndimage import distance_transform_edt
 
     states = character.kinematics(poses)
@@ -143,7 +143,7 @@ def _within_reach(
     away = track.ankles - hip
     stretch = np.linalg.norm(away, axis=1) / length
     over = np.maximum(stretch - _EASY, 0.0)
-    # From where it is easy it goes on ever slower, and never comes to the leg's whole length.
+    # Beyond that it goes on more and more slowly, and never reaches the leg's whole length.
     least = np.minimum(stretch, _EASY) + _REST * (1.0 - np.exp(-over / _REST))
     near = distance_transform_edt(~track.locked) / fps
     share = rotations.ease(near / _REACH_S) * (least / stretch - 1.0)
@@ -153,7 +153,7 @@ def _within_reach(
 def _channels(
     plan: CoursePlan, tracks: Sequence[FootTrack], times: FloatArray, fps: float
 ) -> dict[str, FloatArray]:
-    """What the body does, the pelvis's place apart."""
+    """What the body does, except where the pelvis is over the ground."""
     channels = {name: np.zeros(len(times)) for name in CHANNELS}
 
     def add(angles: dict[str, float], share: FloatArray | float) -> None:
@@ -162,8 +162,8 @@ def _channels(
 
     facing = _smooth(_through(plan.headings, times), _TURN_S * fps)
     forward = np.stack([np.cos(facing), np.sin(facing)], axis=1)
-    apart = (tracks[1].ankles - tracks[0].ankles)[:, :2]
-    ahead = np.clip(_smooth((apart * forward).sum(axis=1) / FULL_STEP, _ARM_S * fps), -1.2, 1.2)
+    between = (tracks[1].ankles - tracks[0].ankles)[:, :2]
+    ahead = np.clip(_smooth((between * forward).sum(axis=1) / FULL_STEP, _ARM_S * fps), -1.2, 1.2)
     loaded = tracks[0].locked.astype(float) - tracks[1].locked
     middle = 0.5 * (tracks[0].ankles + tracks[1].ankles)[:, :2]
     speed = np.linalg.norm(np.gradient(_smooth(middle, 0.25 * fps), 1.0 / fps, axis=0), axis=1)

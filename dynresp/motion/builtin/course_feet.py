@@ -1,4 +1,4 @@
-"""The way of each foot along a course: it stands, rolls off the ground, swings and lands.
+"""The path of each foot along a course: it stands, rolls off the ground, swings and lands.
 
 A swing over level ground has the shape that the published gait curves give (`walk.toml`): how far
 the ankle has come, the pitch of the foot and the height of the ankle over a sole that touches, each
@@ -36,9 +36,9 @@ _RISING, _RISE_S = (0.0, 0.035, 0.094, 0.206, 0.384, 0.67, 1.0), 0.28
 _LOWER_S, _TIP_S = 0.20, 0.12
 # Parts of its time at which a foot that is raised begins and ends to go on: up, down, and level.
 _GOES_ON = {1: (0.15, 0.90), -1: (0.05, 0.75), 0: (0.08, 0.92)}
-# In a jump: how much of the way they go at a constant speed.
+# In a jump: the part of the path that they travel at a constant speed.
 _FLIES = 0.6
-# From and to which part of the flight the feet are drawn up.
+# From and to which part of the flight the feet are raised.
 _DRAWN_UP = (0.35, 0.60)
 # Part of the time in which a foot is raised, and how high its ankle passes before that [m].
 _RAISING, _PASSING = 0.30, 0.16
@@ -57,7 +57,7 @@ def foot_track(falls: Sequence[Footfall], sole: Sole, times: FloatArray) -> Foot
     locked = np.zeros(frames, dtype=np.bool_)
     pitch = _stance_pitch(falls, times)
     for fall in falls:
-        # Rounding: a frame on the very edge of a stance belongs to it.
+        # Rounding: a frame right at the end of a stance belongs to it.
         here = (times >= fall.land - 1e-9) & (times <= fall.leave + 1e-9)
         ankles[here], feet[here] = _planted(sole, fall, pitch[here], "auto")
         locked |= here
@@ -110,7 +110,7 @@ def _stance_pitch(falls: Sequence[Footfall], times: FloatArray) -> FloatArray:
 def _swing(
     sole: Sole, before: Footfall, after: Footfall, u: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Ankle and orientation of a foot in the air at parts u of its way."""
+    """Ankle and orientation of a foot in the air at parts u of its swing."""
     a, b = before.place, after.place
     backward = after.reach < 0 and after.top is None
     pitch = np.radians(_swing_pitch(before.leave_pitch, after.land_pitch, backward, u))
@@ -131,11 +131,11 @@ def _swing(
         share = rotations.ease((u - begin) / (end - begin))
         if after.hop:
             share = _FLIES * u + (1.0 - _FLIES) * share
-        way = float(np.linalg.norm((stop - start)[:2]))
-        # When the foot is as far from where it lands as it begins and ends to have to be raised.
+        length = float(np.linalg.norm((stop - start)[:2]))
+        # When the foot is as far from its landing as where it begins and ends to be raised.
         fine = np.linspace(0.0, 1.0, 101)
-        left = way * (1.0 - rotations.ease((fine - begin) / (end - begin)))
-        at = np.interp([-min(x, way) for x in after.over], -left, fine)
+        left = length * (1.0 - rotations.ease((fine - begin) / (end - begin)))
+        at = np.interp([-min(x, length) for x in after.over], -left, fine)
         if after.hop:
             at = np.array(_DRAWN_UP)
         path[:, 2] = _raised_height(sole, a.z, (start[2], stop[2]), after.top, at, u)
@@ -190,7 +190,7 @@ def _raised_height(
 
 
 def _curve(values: tuple[float, ...], u: FloatArray) -> FloatArray:
-    """A smooth curve through values at equal parts of the way, at parts u of it."""
+    """A smooth curve through values at equal parts of 0 to 1, at u."""
     out: FloatArray = _spline(values)(u)
     return out
 

@@ -1,4 +1,4 @@
-"""From the moves of a course to what has to be where and when.
+"""From the moves of a course to a plan of feet, centre of pressure and posture over time.
 
 The plan says where and when each foot stands, where the ground bears the body (the centre of
 pressure), how high the pelvis is, which way the body faces and what posture it takes on the way;
@@ -32,7 +32,7 @@ _DOUBLE = 0.22
 # Time to shift the weight onto one foot before the first step [s] (Brenière & Do 1986, J.
 # Biomechanics 19(12): anticipation takes about half a second).
 _SHIFT_S = 0.45
-# The middle of the foot lies so far before the ankle [m] (models/ragdoll.xml).
+# The middle of the foot is this far before the ankle [m] (models/ragdoll.xml).
 _MIDFOOT = 0.035
 # How far the pelvis is lower at the longest spread of the legs and at mid-stance than standing [m],
 # in ordinary walking: 2.5 cm apart, as in the same file.
@@ -47,18 +47,18 @@ _CROUCH_S, _RECOVER_S = 0.5, 0.6
 _STRETCHED, _LANDING = 0.03, -0.08
 
 
-class Place(NamedTuple):
-    """A place on a surface: x, y, z [m], and which way it faces [rad]."""
+class Placement(NamedTuple):
+    """A point on a surface: x, y, z [m], and the direction it faces [rad]."""
 
     x: float
     y: float
     z: float
     yaw: float
 
-    def on(self, forward: float, left: float, up: float = 0.0, turn: float = 0.0) -> Place:
-        """The place that is so far ahead, to the left and up [m], turned to the left [rad]."""
+    def on(self, forward: float, left: float, up: float = 0.0, turn: float = 0.0) -> Placement:
+        """The placement that is so far ahead, to the left and up [m], turned to the left [rad]."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        return Place(
+        return Placement(
             self.x + cos * forward - sin * left,
             self.y + sin * forward + cos * left,
             self.z + up,
@@ -68,7 +68,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Footfall:
-    """One stance of a foot, and the way it came there.
+    """One stance of a foot, and the swing before it.
 
     Attributes:
         place: Where its ankle is over the surface while it stands flat, and where the toes point.
@@ -78,13 +78,13 @@ class Footfall:
         leave_pitch: The same when it leaves; below 0 the heel is up.
         reach: How far ahead of its last stance, in full strides of ordinary walking; below 0
             backward.
-        size: Length of the way from there, in full strides, at most 1.
-        top: Height that the sole passes at on the way [m], None for the low swing of walking.
+        size: Distance from there, in full strides, at most 1.
+        top: Height at which the sole passes in the swing [m], None for the low swing of walking.
         over: From how far to how far before the landing it does [m].
         hop: Whether the body flies and takes both feet along.
     """
 
-    place: Place
+    place: Placement
     land: float
     leave: float
     land_pitch: float = 0.0
@@ -98,7 +98,7 @@ class Footfall:
 
 @dataclass
 class CoursePlan:
-    """What has to be where and when; see the module.
+    """Feet, centre of pressure and posture over time; see the module.
 
     Attributes:
         feet: Stances of the left and the right foot, in order of time.
@@ -121,7 +121,7 @@ class CoursePlan:
 
 
 def plan_course(course: Course) -> CoursePlan:
-    """Work out the plan of a course."""
+    """The plan of a course."""
     planner = _Planner(course)
     for name in course.route:
         start = planner.time
@@ -138,11 +138,11 @@ def plan_course(course: Course) -> CoursePlan:
 
 
 class _Planner:
-    """The plan as far as it has got, and where the body is."""
+    """Builds the plan move by move; knows where the body is."""
 
     def __init__(self, course: Course) -> None:
         x, y, facing = course.start
-        self.body = Place(x, y, 0.0, math.radians(facing))
+        self.body = Placement(x, y, 0.0, math.radians(facing))
         first = [[Footfall(self._beside(i, _APART), 0.0, 0.0)] for i in range(2)]
         self.plan = CoursePlan((first[0], first[1]))
         self.time = 0.0
@@ -184,7 +184,7 @@ class _Planner:
             self.time, self.next, self.stood = land, other, False
 
     def _heights_of_step(
-        self, before: Place, stands: Place, after: Place, times: tuple[float, float]
+        self, before: Placement, stands: Placement, after: Placement, times: tuple[float, float]
     ) -> None:
         """The pelvis half-way through a swing, and when both feet stand again."""
         ahead = (after.x - stands.x) * math.cos(after.yaw) + (after.y - stands.y) * math.sin(
@@ -254,27 +254,27 @@ class _Planner:
         self.plan.duration = self.time
         return self.plan
 
-    def _beside(self, i: int, apart: float) -> Place:
+    def _beside(self, i: int, apart: float) -> Placement:
         """Where the left (0) or right (1) foot stands where the body is."""
         side = 1.0 - 2.0 * i
         return self.body.on(0.0, 0.5 * side * apart, 0.0, side * math.radians(_TOE_OUT))
 
-    def _middle(self) -> Place:
+    def _middle(self) -> Placement:
         """Midway between the feet, facing as the body does."""
         (ax, ay, az, _), (bx, by, bz, _) = (
             falls[-1].place.on(_MIDFOOT, 0.0) for falls in self.plan.feet
         )
-        return Place(0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), self.body.yaw)
+        return Placement(0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), self.body.yaw)
 
-    def _press(self, time: float, at: Place) -> None:
+    def _press(self, time: float, at: Placement) -> None:
         self.plan.pressure.append((time, at.x, at.y, at.z))
 
 
-def _fall(move: Step, before: Place, after: Place, land: float) -> tuple[Footfall, float]:
+def _fall(move: Step, before: Placement, after: Placement, land: float) -> tuple[Footfall, float]:
     """The stance that a step leads to, and the pitch of the foot as it leaves for it [deg]."""
     middle = 0.5 * (before.yaw + after.yaw)
     ahead = (after.x - before.x) * math.cos(middle) + (after.y - before.y) * math.sin(middle)
-    way = math.hypot(after.x - before.x, after.y - before.y)
+    distance = math.hypot(after.x - before.x, after.y - before.y)
     reach = max(-1.0, min(ahead / (2.0 * FULL_STEP), 1.1))
     climbs = after.z - before.z
     if move.lift or climbs:
@@ -290,5 +290,5 @@ def _fall(move: Step, before: Place, after: Place, land: float) -> tuple[Footfal
     heel = heel if move.heel is None else -move.heel
     pitch = pitch if move.land is None else move.land
     over = move.over or (math.inf, 0.0)
-    size = min(way / (2.0 * FULL_STEP), 1.0)
+    size = min(distance / (2.0 * FULL_STEP), 1.0)
     return Footfall(after, land, land, pitch, 0.0, reach, size, top, over), heel

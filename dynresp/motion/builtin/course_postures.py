@@ -1,4 +1,4 @@
-"""Postures on a course: what trunk and arms do besides walking and standing."""
+"""Postures on a course: what trunk and arms do in addition to walking and standing."""
 
 from __future__ import annotations
 

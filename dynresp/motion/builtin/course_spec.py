@@ -1,8 +1,8 @@
-"""What may stand in the `[course]` of a built-in motion: a way that is gone step by step.
+"""The `[course]` of a built-in motion: a path that is walked step by step.
 
 A course is a list of moves: steps, stays (the feet stand) and jumps. Moves that belong together
-make a phrase, and the route is a list of phrases, each as it stands or mirrored. Every move is told
-from where the body is and faces, so phrases follow each other without a seam.
+are a phrase, and the route is a list of phrases, each as written or mirrored. Every move is
+relative to where the body is and faces, so phrases follow each other without a seam.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _with_tuple(data: Any, key: str) -> Any:
 
 
 class Step(Strict):
-    """Steps, all alike: the body goes on by as much with each, and one foot comes to stand there.
+    """Equal steps: with each the body moves on by as much, and one foot is put down there.
 
     Attributes:
         count: How many.
@@ -138,7 +138,7 @@ Move = Annotated[Step | Stay | Jump, Field(discriminator="do")]
 
 
 class Course(Strict):
-    """A whole way, from standing to standing.
+    """A whole path, from standing to standing.
 
     Attributes:
         start: Where the body stands at first, x, y [m], and which way it faces [deg] from +X.
@@ -172,7 +172,7 @@ class Course(Strict):
         return self
 
     def _alternate(self) -> None:
-        """Refuse a foot that is to go twice while the other has not come."""
+        """Refuse a foot that steps twice in a row."""
         left, stepped = True, False
         for move, mirrored in self.moves():
             if not isinstance(move, Step):
@@ -181,8 +181,8 @@ class Course(Strict):
             first = left if move.foot is None else (move.foot == "left") != mirrored
             if stepped and first != left:
                 raise ValueError(
-                    f"route: the {'left' if first else 'right'} foot is to go, but it went last "
-                    "and the other has not followed; leave out 'foot', or stay before"
+                    f"route: the {'left' if first else 'right'} foot steps twice in a row "
+                    "without the other; leave out 'foot', or stay before"
                 )
             left, stepped = first == (move.count % 2 == 0), True
 

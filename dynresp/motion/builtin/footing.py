@@ -23,7 +23,7 @@ from dynresp.motion.rotations import FloatArray
 BLEND_TIME = 0.25
 """Time over which a foot passes between standing and following its leg's joint angles [s]."""
 
-# A leg that stands is stretched to at most this part of its length: a straight knee snaps.
+# A standing leg is stretched to at most this part of its length: a straight knee snaps.
 _STRETCH = 0.998
 # A body may be this deep in the ground before the whole character is raised [m].
 _DEPTH = 0.004
@@ -57,7 +57,7 @@ class FootTrack:
 
 @dataclass(frozen=True)
 class Sole:
-    """The shape of a foot as standing on it needs it.
+    """The shape of a foot as far as standing needs it.
 
     Attributes:
         heel: (3,) middle of the sole's rear edge in the foot's frame [m].

@@ -1,4 +1,4 @@
-"""The files of the built-in motions: what may stand in them, and how a wrong one is refused.
+"""Files of built-in motions: what they may hold, and reading one.
 
 `reactions/builtin/README.md` explains the format to the people who write such files. Angles are in
 degrees under anatomical names, lengths in metres, times in seconds.
@@ -73,8 +73,8 @@ class Stance(_Span):
         land: The toes are raised by this when the foot touches down; below 0 they come first [deg].
         push: The heel has risen by this more when the foot leaves [deg].
         push_time: For how long it rises before [s].
-        by: How the foot gets here from its previous stance: it steps, or the leg moves freely by
-            its joint angles.
+        by: How the foot gets here from its previous stance: by a step, or freely by the leg's
+            joint angles.
         lift: Height of the step [m].
     """
 

@@ -1,4 +1,4 @@
-"""What a file may say about the body's posture: anatomical angles, and the names of them all.
+"""Postures in the files of built-in motions: anatomical angles, and their names.
 
 `reactions/builtin/README.md` explains them to the people who write such files.
 """
@@ -88,7 +88,7 @@ class Posture(Strict):
         """The values this key sets, under names such as "left_hip.flexion" or "left_knee"."""
         given = self.model_dump(exclude_none=True, exclude={"time"})
         values: dict[str, float] = {}
-        # Plural names first, so that a side's own value stands above what is said of both.
+        # Plural names first, so that a side's own value replaces that of both.
         for part in sorted(given, key=lambda name: name not in PLURALS):
             for target in PLURALS.get(part, (part,)):
                 value = given[part]

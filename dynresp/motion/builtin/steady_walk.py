@@ -80,7 +80,7 @@ def walk_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, lis
 def _tracks(
     gait: Gait, character: Character, poses: FloatArray, phase: FloatArray, fps: float
 ) -> list[FootTrack]:
-    """Where the feet stand and how they swing; all stances lie one step apart on a line."""
+    """Where the feet stand and how they swing; all stances are one step apart on a line."""
     from scipy.ndimage import gaussian_filter1d
 
     states = character.kinematics(poses)
@@ -120,8 +120,8 @@ def _tracks(
         least = least + over * (gaussian_filter1d(least, 0.04 * fps) - least)
         floor = least + _TOE_CLEARANCE * over
         # A smooth maximum, whose rounding vanishes where the foot stands.
-        apart, rounding = ankles[:, 2] - floor, 3.0 * _TOE_CLEARANCE * over
-        ankles[:, 2] = floor + 0.5 * (apart + np.sqrt(apart**2 + rounding**2))
+        above, rounding = ankles[:, 2] - floor, 3.0 * _TOE_CLEARANCE * over
+        ankles[:, 2] = floor + 0.5 * (above + np.sqrt(above**2 + rounding**2))
         tracks.append(FootTrack(ankles, foot, np.ones(len(phase)), locked))
     return tracks
 

@@ -1,12 +1,12 @@
 """Which of the four contact cases a transition is for each foot (Lee et al. 2002, section 4.1.1).
 
 A transition goes from frame i to frame j of a database, and the frames from j to j + b - 1 are
-blended. Told is the first stance of a foot that meets that blend.
+blended. The case is that of a foot's first stance in the blend.
 
-A stance that begins with frame j itself, where the foot has just landed, is case 4 as well if it
-outlasts the blend, by the paper's letter. Such a foot could be put where the motion after has it;
-but it lands where the blend is strongest, and walks in which these count as case 2 slide more (5 %
-of all stances by more than 1 cm, instead of 3 %).
+By the paper's text a stance that begins with frame j itself, where the foot has just landed, is
+case 4 as well if it outlasts the blend. Such a foot could be put where the motion after has it; but
+it lands where the blend is strongest, and walks in which these count as case 2 slide more (5 % of
+all stances by more than 1 cm, instead of 3 %).
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ import numpy.typing as npt
 
 
 class ContactCase(IntEnum):
-    """How a stance lies to a blend; the numbers are the paper's.
+    """When a stance begins and ends relative to a blend; the numbers are the paper's.
 
     Attributes:
         NONE: The foot does not stand in the blend.
         BEFORE: Begun before the blend, ended in it.
         AFTER: Begun in the blend, ended after it.
         INSIDE: All in the blend.
-        ACROSS: It lasts for the whole blend, begun before or landed with it: nowhere can it pass
-            from the one motion's place to the other's. `foot_fitting` puts it once, between the two
-            if it has just begun, and leaves it there until it is lifted; a graph may rather drop
-            the transition.
+        ACROSS: It lasts for the whole blend, begun before or with it: it cannot move from where one
+            motion has it to where the other does. `foot_fitting` puts it once, between the two if
+            it has just begun, and leaves it there until the foot is lifted; a graph may drop
+            the transition instead.
     """
 
     NONE = 0

@@ -32,7 +32,7 @@ class FootTracks:
 
 
 def foot_tracks(character: Character, poses: FloatArray) -> FootTracks:
-    """Hips and feet of poses (frames, 59), worked out block by block to save memory."""
+    """Hips and feet of poses (frames, 59), computed block by block to save memory."""
     n = len(poses)
     tracks = FootTracks(np.empty((2, n, 3)), np.empty((2, n, 3)), np.empty((2, n, 4)))
     for start in range(0, n, _BLOCK):

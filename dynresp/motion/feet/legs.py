@@ -2,7 +2,7 @@
 
 Hip, knee and ankle form a triangle whose third side is given: the knee bends as far as the law of
 cosines asks, and the whole leg then turns about the hip. The foot keeps its orientation in the
-world. Exact within reach; an ankle out of reach is left on the line towards its target.
+world. Exact within reach; an ankle out of reach ends on the line towards its target.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def place_ankles(
     ankles: npt.ArrayLike,
     feet: npt.ArrayLike | None = None,
 ) -> FloatArray:
-    """Bend the legs so that the ankles come to lie at given points; the root stays.
+    """Bend the legs so that the ankles are at given points; the root stays.
 
     Args:
         character: The character.
         poses: (frames, 59).
-        ankles: (frames, 2, 3) wanted positions of the left and right ankle joint [m], world.
-        feet: (frames, 2, 4) wanted orientations of the feet, w x y z, world; by default those
+        ankles: (frames, 2, 3) target positions of the left and right ankle joint [m], world.
+        feet: (frames, 2, 4) target orientations of the feet, w x y z, world; by default those
             that they have.
 
     Returns:
@@ -70,9 +70,9 @@ def place_ankles(
 def bend_turns(
     hip: FloatArray, knee: FloatArray, ankle: FloatArray, lateral: FloatArray, target: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """How to turn two bones so that the end of the second comes to lie at a target.
+    """How to turn two bones so that the end of the second is at a target.
 
-    Told for a leg; an arm is one whose lateral axis points the other way.
+    Described for a leg; for an arm the lateral axis points the other way.
 
     Args:
         hip: (frames, 3) where the first bone begins [m].

@@ -1,9 +1,9 @@
 """How far standing feet slide over the ground.
 
-A foot stands on the corners of its sole that touch, and on all that lies between them. From one
-frame to the next it slides by the way of that one of these points that moves least. A foot that
-rolls over its heel or its ball does not slide, and one that pivots on its sole does not, either:
-the point about which it turns stays.
+A foot stands on the corners of its sole that touch, and on all points between them. From one frame
+to the next it slides as far as that one of these points that moves least. A foot that rolls over
+its heel or its ball does not slide, and one that pivots on its sole does not, either: the point
+about which it turns stays.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.runs import runs
 
 TOUCH = 0.005
-"""A corner touches that is at most this much higher than the sole's lowest [m]: a shoe gives, and
-so does the measurement."""
+"""A corner touches that is at most this much higher than the sole's lowest [m]: shoes are soft, and
+measurements not exact."""
 
 
 def foot_slides(character: Character, states: BodyStates) -> FloatArray:
-    """The way that each foot slides from each frame to the next, if it stands.
+    """How far each foot slides from each frame to the next, if it stands.
 
     Args:
         character: The character.
@@ -52,7 +52,7 @@ def foot_skates(motion: Motion, character: Character) -> list[float]:
     """
     slides = foot_slides(character, character.kinematics(motion.poses))
     skates: list[float] = []
-    for way, contact in zip(slides.T, motion.contacts.T, strict=True):
+    for slide, contact in zip(slides.T, motion.contacts.T, strict=True):
         standing = contact[:-1] & contact[1:]
-        skates += [float(way[start:stop].sum()) for start, stop in runs(standing)]
+        skates += [float(slide[start:stop].sum()) for start, stop in runs(standing)]
     return skates

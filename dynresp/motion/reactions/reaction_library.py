@@ -1,4 +1,4 @@
-"""The reaction library: which stretches of motion capture a hit person can go on with.
+"""Reaction libraries: recorded answers to a hit, loaded from files or made by dynresp.
 
 A library is a TOML file of `[[reaction]]` tables; `reactions/README.md` describes it.
 """
@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 BUILTIN = "builtin"
-"""Name of the library of the motions that this project makes itself."""
+"""Name of the library of built-in motions, which dynresp makes itself."""
 
 RECORDED = ("core", "full")
 """Names of the shipped libraries of motion capture, the smaller first."""
@@ -49,16 +49,16 @@ _NAMED_MISSING = 5
 
 @dataclass(frozen=True)
 class Reaction:
-    """One way to go on.
+    """One recorded or built-in answer to a hit.
 
     Attributes:
         name: Unique in its library.
         strategy: One of `STRATEGIES`.
         motion: The stretch, at the library's frame rate, its first frame close to the hit; it
-            starts over the origin facing +X and bears its strategy as a label.
+            starts over the origin facing +X and has its strategy as a label.
         mirrored: Whether left and right are exchanged.
-        builtin: Whether this project made the motion; it is then no motion capture.
-        source: Where it comes from, for people.
+        builtin: Whether dynresp made the motion; then it is not motion capture.
+        source: Where it comes from, for users to read.
         start_s: Where in its file the motion begins [s]; 0 for a built-in motion.
     """
 
@@ -139,7 +139,7 @@ def load_library(
 def builtin_library(
     character: Character | None = None, fps: float = 30.0, mirrors: bool = True
 ) -> ReactionLibrary:
-    """The library of the motions that this project makes itself: all twelve strategies.
+    """The library of built-in motions: all twelve strategies.
 
     Args:
         character: The character, by default the product's.
@@ -184,17 +184,17 @@ def _find_files(
     names = sorted({entry.file for entry in entries if entry.file})
     found = {name: find_motion_file(name, folders) for name in names}
     missing = [name for name, path in found.items() if path is None]
-    # An AMC file is of no use without its skeleton, which a broken-off fetch may have left out.
+    # An AMC file needs its skeleton, which an interrupted fetch may have left out.
     sources = load_sources()
     skeletons = {sources[n].skeleton for n in names if n in sources} - {None}
     missing += sorted(s for s in skeletons if s and find_motion_file(s, folders) is None)
     if missing:
         looked = ", ".join(str(folder) for folder in folders) or "no folder: none is known"
         more = len(missing) - _NAMED_MISSING
-        told = ", ".join(missing[:_NAMED_MISSING]) + (f" and {more} more" if more > 0 else "")
+        named = ", ".join(missing[:_NAMED_MISSING]) + (f" and {more} more" if more > 0 else "")
         fetch = f"fetch them with `dynresp motions fetch {which}`, or " if which in RECORDED else ""
         raise MissingMotionDataError(
-            f"the library {which!r} needs motion files that are not on this machine: {told} "
+            f"the library {which!r} needs motion files that are not on this machine: {named} "
             f"(looked in {looked}); {fetch}name a folder that holds them with --motions or "
             "DYNRESP_MOTIONS."
         )
@@ -208,7 +208,7 @@ def _recorded_or_builtin(
         return _builtin(entry, entry.builtin, character, fps)
     assert entry.file is not None
     assert entry.frames is not None
-    # Cut after the whole clip has been set on the floor: a stretch alone may not show it.
+    # Cut after the whole clip has been set on the floor: a part alone may not show where it is.
     whole = load_motion(files[entry.file], character)
     start, stop = entry.frames
     if stop > len(whole):

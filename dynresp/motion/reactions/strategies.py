@@ -1,4 +1,4 @@
-"""The strategies by which people answer a hit (Zordan et al. 2007, section 7.1)."""
+"""Strategies: the kinds of reactions to a hit (Zordan et al. 2007, section 7.1)."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from dynresp.motion.readers.asf_amc import read_asf_amc
 from dynresp.motion.readers.bvh import read_bvh
 from dynresp.motion.readers.deepmimic import read_deepmimic
 from dynresp.motion.readers.skeleton import SkeletonMotion
-from dynresp.motion.readers.text import fail
+from dynresp.motion.readers.text import file_error
 from dynresp.support.errors import MotionFileError
 
 __all__ = [
@@ -32,7 +32,7 @@ def read_motion_file(
     up: str | None = None,
     fps: float | None = None,
 ) -> SkeletonMotion:
-    """Read a motion file of any format known, by its suffix.
+    """Read a motion file of any known format; its suffix says which.
 
     Args:
         path: The file.
@@ -42,7 +42,7 @@ def read_motion_file(
         fps: Frames per second; None takes what the file states.
 
     Raises:
-        MotionFileError: If the suffix is unknown, the file cannot be read, or something is told
+        MotionFileError: If the suffix is unknown, the file cannot be read, or something is given
             that the format already fixes.
     """
     path = Path(path)
@@ -50,15 +50,15 @@ def read_motion_file(
     if suffix == ".amc":
         return read_asf_amc(path, asf_path, unit=unit, up=up, fps=fps)
     if asf_path is not None:
-        raise fail(path, "only an AMC file takes an ASF skeleton")
+        raise file_error(path, "only an AMC file takes an ASF skeleton")
     if suffix == ".bvh":
         return read_bvh(path, unit=unit, up=up, fps=fps)
     if suffix in (".json", ".txt"):
         if unit is not None or up is not None:
-            raise fail(path, "DeepMimic files are in metres with Y up; do not tell unit or up")
+            raise file_error(path, "DeepMimic files are in metres with Y up; leave out unit and up")
         return read_deepmimic(path, fps=fps)
     if suffix == ".asf":
-        raise fail(path, "is a skeleton without motion; read an AMC file that goes with it")
+        raise file_error(path, "is a skeleton without motion; read an AMC file that goes with it")
     raise MotionFileError(
         f"{path}: no motion format has the suffix {suffix!r}; known are {', '.join(SUFFIXES)}"
     )

@@ -9,11 +9,11 @@ import numpy as np
 from dynresp.motion.rotations import FloatArray, identity, multiply
 
 
-def turns(axes: Sequence[int], angles: FloatArray) -> FloatArray:
-    """Product of turns about coordinate axes: R(axes[0]) R(axes[1]) ...
+def rotations_about_axes(axes: Sequence[int], angles: FloatArray) -> FloatArray:
+    """Product of rotations about coordinate axes: R(axes[0]) R(axes[1]) ...
 
-    The last factor is applied first to a vector, or, which is the same, each further turn is about
-    the axis as the turns before have left it.
+    The last factor is applied first to a vector. Or, which is the same: each rotation is about the
+    axis as the rotations before it have turned it.
 
     Args:
         axes: 0, 1 or 2 for x, y or z; any number of them, in any order.

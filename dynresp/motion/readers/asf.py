@@ -1,7 +1,7 @@
 """Acclaim ASF: the skeleton that an AMC motion moves.
 
 A bone has a direction and a length in the world's axes, as the skeleton stands at rest, and a
-frame (`axis`) in which its rotations are told. The format is described in J. Lander, "Working with
+frame (`axis`) in which its rotations are given. The format is described in J. Lander, "Working with
 Motion Capture File Formats", Game Developer, January 1998: `dof` and `order` say in which order
 the numbers stand in the AMC file, the letters after `axis` in which order the rotations are
 applied (XYZ: about x first).
@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.motion.readers.angles import turns
+from dynresp.motion.readers.angles import rotations_about_axes
 from dynresp.motion.readers.skeleton import MAX_JOINTS
-from dynresp.motion.readers.text import decode, fail, numbers, read_bounded
+from dynresp.motion.readers.text import decode, file_error, numbers, read_bounded
 from dynresp.motion.rotations import FloatArray, angle_between
 
 ROOT = "root"
@@ -51,7 +51,7 @@ class Bone:
 
 @dataclass
 class AsfSkeleton:
-    """A skeleton as its ASF file tells it, the root first and parents before children.
+    """A skeleton as its ASF file describes it, the root first and parents before children.
 
     Attributes:
         path: The file.
@@ -70,10 +70,10 @@ class AsfSkeleton:
     root_position: FloatArray
 
     def frame(self, bone: Bone) -> FloatArray:
-        """Quaternion (4,) of the frame in which a bone's rotations are told."""
+        """Quaternion (4,) of the frame in which a bone's rotations are given."""
         order = bone.order[::-1]
         angles = np.array([[bone.axis[axis] for axis in order]]) * self.radians
-        return turns(order, angles).reshape(4)
+        return rotations_about_axes(order, angles).reshape(4)
 
     def joints(self) -> tuple[list[str], list[int], FloatArray]:
         """Names, parents and rest offsets (joints, 3) of the joints: bones, then their free ends.
@@ -96,14 +96,14 @@ class AsfSkeleton:
         return float(sum(np.linalg.norm(bone.vector) for bone in self.bones)) * self.unit
 
     def resembles(self, other: AsfSkeleton) -> bool:
-        """Whether a motion comes out the same on both: all but the free ends of bones agree."""
+        """Whether a motion is the same on both: all but the free ends of bones agree."""
         if self.parents != other.parents or any(
             (a.name, a.channels, a.order) != (b.name, b.channels, b.order)
             for a, b in zip(self.bones, other.bones, strict=True)
         ):
             return False
         inner = sorted({parent for parent in self.parents if parent >= 0})
-        apart = [
+        offsets = [
             np.linalg.norm(self.bones[i].vector * self.unit - other.bones[i].vector * other.unit)
             for i in inner
         ]
@@ -111,7 +111,7 @@ class AsfSkeleton:
             angle_between(self.frame(a), other.frame(b))
             for a, b in zip(self.bones, other.bones, strict=True)
         ]
-        return bool(max(apart, default=0.0) < _SAME_PLACE and max(turned) < _SAME_ANGLE)
+        return bool(max(offsets, default=0.0) < _SAME_PLACE and max(turned) < _SAME_ANGLE)
 
 
 def read_asf(path: Path) -> AsfSkeleton:
@@ -142,24 +142,24 @@ def read_asf(path: Path) -> AsfSkeleton:
         elif section == ":bonedata":
             if key == "begin":
                 if len(blocks) >= MAX_JOINTS:
-                    raise fail(path, f"has more than {MAX_JOINTS} bones", line)
+                    raise file_error(path, f"has more than {MAX_JOINTS} bones", line)
                 block = _Block(line, {})
                 blocks.append(block)
             elif block is None:
-                raise fail(path, f"expected 'begin' before {key[:40]!r}", line)
+                raise file_error(path, f"expected 'begin' before {key[:40]!r}", line)
             elif key == "end":
                 block = None
             else:
                 block.rows[key] = (line, rest)
         elif section == ":hierarchy" and words not in (["begin"], ["end"]):
             if words[0] in children:
-                raise fail(path, f"the children of {words[0]!r} are listed twice", line)
+                raise file_error(path, f"the children of {words[0]!r} are listed twice", line)
             children[words[0]] = (line, rest)
     bones = _bones(path, root, blocks)
     order, parents = _tree(path, bones, children)
     length = units.numbers(path, "length", 1, default=[1.0])[0]
     if length <= 0:
-        raise fail(path, f"expected a positive length under :units, found {length:g}")
+        raise file_error(path, f"expected a positive length under :units, found {length:g}")
     angle = units.rows.get("angle", (0, ["deg"]))[1]
     return AsfSkeleton(
         path=path,
@@ -181,14 +181,14 @@ class _Block:
     def numbers(
         self, path: Path, key: str, count: int, default: list[float] | None = None
     ) -> list[float]:
-        """The first numbers after a key; an error if the key is missing and has no default."""
+        """The first numbers after a key; an error if the key is missing and there is no default."""
         if key not in self.rows:
             if default is None:
-                raise fail(path, f"this bone has no {key!r}", self.line)
+                raise file_error(path, f"this bone has no {key!r}", self.line)
             return default
         line, words = self.rows[key]
         if len(words) < count:
-            raise fail(path, f"{key} needs {count} numbers, found {len(words)}", line)
+            raise file_error(path, f"{key} needs {count} numbers, found {len(words)}", line)
         return numbers(path, words[:count], line, key)
 
     def order(self, path: Path, word: int) -> tuple[int, ...]:
@@ -196,7 +196,9 @@ class _Block:
         line, words = self.rows.get("axis", (self.line, []))
         letters = words[word].lower() if len(words) > word else "xyz"
         if sorted(letters) != ["x", "y", "z"]:
-            raise fail(path, f"expected x, y and z in some order, found {letters[:40]!r}", line)
+            raise file_error(
+                path, f"expected x, y and z in some order, found {letters[:40]!r}", line
+            )
         return tuple("xyz".index(letter) for letter in letters)
 
     def channels(self, path: Path, key: str) -> tuple[str, ...]:
@@ -205,7 +207,7 @@ class _Block:
         channels = tuple(word.lower() for word in words)
         unknown = [channel for channel in channels if channel not in _CHANNELS]
         if unknown or len(set(channels)) != len(channels):
-            raise fail(
+            raise file_error(
                 path,
                 f"{key} takes {', '.join(_CHANNELS)}, each once at most; found "
                 f"{' '.join(words)[:80]!r}",
@@ -217,7 +219,7 @@ class _Block:
 def _bones(path: Path, root: _Block, blocks: list[_Block]) -> dict[str, Bone]:
     """The root and the bones by name."""
     if not blocks:
-        raise fail(path, "has no bones under :bonedata; expected an ASF skeleton")
+        raise file_error(path, "has no bones under :bonedata; expected an ASF skeleton")
     bones = {
         ROOT: Bone(
             name=ROOT,
@@ -230,7 +232,9 @@ def _bones(path: Path, root: _Block, blocks: list[_Block]) -> dict[str, Bone]:
         line, words = block.rows.get("name", (block.line, []))
         name = " ".join(words)
         if not name or name in bones:
-            raise fail(path, f"a second bone is called {name!r}" if name else "has no name", line)
+            raise file_error(
+                path, f"a second bone is called {name!r}" if name else "has no name", line
+            )
         direction = np.array(block.numbers(path, "direction", 3))
         scale = float(np.linalg.norm(direction))
         length = block.numbers(path, "length", 1)[0]
@@ -254,14 +258,14 @@ def _tree(
     while waiting:
         name, parent, line = waiting.pop()
         if name not in bones:
-            raise fail(path, f":hierarchy names {name[:40]!r}, which is no bone", line)
+            raise file_error(path, f":hierarchy names {name[:40]!r}, which is not a bone", line)
         if name in placed:
-            raise fail(path, f"bone {name!r} has two parents", line)
+            raise file_error(path, f"bone {name!r} has two parents", line)
         placed[name] = len(parents)
         parents.append(parent)
         line, below = children.get(name, (line, []))
         waiting += [(child, placed[name], line) for child in reversed(below)]
     lost = [name for name in bones if name not in placed]
     if lost:
-        raise fail(path, f"bone {lost[0]!r} does not hang on the root in :hierarchy")
+        raise file_error(path, f"bone {lost[0]!r} is not connected to the root in :hierarchy")
     return [bones[name] for name in placed], parents

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.motion.readers.angles import turns
+from dynresp.motion.readers.angles import rotations_about_axes
 from dynresp.motion.readers.asf import AsfSkeleton, Bone, read_asf
 from dynresp.motion.readers.skeleton import SkeletonMotion
 from dynresp.motion.readers.text import (
@@ -17,18 +17,18 @@ from dynresp.motion.readers.text import (
     bad_number,
     check_size,
     decode,
-    fail,
+    file_error,
     number,
     read_bounded,
 )
-from dynresp.motion.readers.world import check_told, to_world
+from dynresp.motion.readers.world import check_options, to_world
 from dynresp.motion.rotations import FloatArray, conjugate, multiply, normalize
 
 CMU_FPS = 120.0
 """Frame rate [1/s] of an AMC file that states none: that of the CMU database, which documents it
 on its pages and not in its files."""
 _MAX_LINE_BYTES = 2**14
-# How far a bone's translations may stray from zero, relative to the longest bone.
+# How far a bone's translations may be from zero, relative to the longest bone.
 _RIGID = 0.05
 
 
@@ -42,7 +42,7 @@ def read_asf_amc(
 ) -> SkeletonMotion:
     """Read an AMC motion with its ASF skeleton.
 
-    The skeleton, if it is not told, is looked for beside the AMC, then one folder up: the only ASF
+    The skeleton, if it is not given, is searched beside the AMC, then one folder up: the only ASF
     there; or the one whose name the AMC's name begins with or has after an underscore, as in
     ann_walk or take3_ann with ann.asf (the longest); or, if all that are there describe one
     skeleton, any.
@@ -51,7 +51,7 @@ def read_asf_amc(
         amc_path: The motion.
         asf_path: The skeleton; None looks for it.
         unit: Metres per unit of the file; None takes `:units length` of the ASF (CMU's 0.45 means
-            1/0.45 inch), unless no person comes out: then it is found by the skeleton's size.
+            1/0.45 inch), unless that is not a person's size: then the skeleton's size shows it.
         up: "x", "y" or "z", the axis that points up; None finds it by how the person stands.
         fps: Frames per second; None takes `:SAMPLES-PER-SECOND` of the AMC, else 120, the rate of
             the CMU database, whose files do not state it.
@@ -61,7 +61,7 @@ def read_asf_amc(
             skeleton is not clear, or bones change their length.
     """
     path = Path(amc_path)
-    check_told(unit, up, fps)
+    check_options(unit, up, fps)
     data = read_bounded(path)
     skeleton = read_asf(Path(asf_path)) if asf_path is not None else _find_asf(path)
     reader = _AmcReader(path, skeleton)
@@ -118,7 +118,7 @@ class _AmcReader:
         line = 0
         for line, row in enumerate(io.BytesIO(data), start=1):
             if len(row) > _MAX_LINE_BYTES:
-                raise fail(self.path, "the line is too long for an AMC file", line)
+                raise file_error(self.path, "the line is too long for an AMC file", line)
             words = row.split()
             if not words or words[0].startswith(b"#"):
                 continue
@@ -129,12 +129,14 @@ class _AmcReader:
                 self._begin_frame(words[0], line)
                 at = 0
             elif self.frames == 0:
-                raise fail(self.path, f"expected a frame number, found {_word(words[0])}", line)
+                raise file_error(
+                    self.path, f"expected a frame number, found {_word(words[0])}", line
+                )
             else:
                 self._bone(words, at, line)
                 at += 1
         if self.frames == 0:
-            raise fail(self.path, "has no frames; expected an AMC file")
+            raise file_error(self.path, "has no frames; expected an AMC file")
         self._check_frame_full(at, line)
         return self._tables()
 
@@ -147,13 +149,15 @@ class _AmcReader:
         elif key == b":samples-per-second":
             self.fps = number(words[1]) if len(words) > 1 else None
             if self.fps is None or self.fps <= 0:
-                raise fail(self.path, "expected a positive number of samples per second", line)
+                raise file_error(
+                    self.path, "expected a positive number of samples per second", line
+                )
 
     def _begin_frame(self, word: bytes, line: int) -> None:
         # Long runs of digits are no frame number, and slow to convert.
         index = int(word) if len(word) <= 9 else -1
         if self.frames and index != self._last + 1:
-            raise fail(
+            raise file_error(
                 self.path, f"expected frame {self._last + 1}, found frame {_word(word)}", line
             )
         self._last = index
@@ -164,7 +168,7 @@ class _AmcReader:
         if self.frames and bones < len(self._moving):
             seen = {bone.name for _, bone in self._order[:bones]}
             missing = next(name for name in self._moving if name not in seen)
-            raise fail(
+            raise file_error(
                 self.path,
                 f"frame {self._last} ends without {missing!r}; expected {len(self._moving)} bones, "
                 f"all with dof in {self.skeleton.path.name}",
@@ -175,9 +179,9 @@ class _AmcReader:
         if self.frames == 1:
             name = decode(words[0])
             if name not in self._moving or name in {bone.name for _, bone in self._order}:
-                raise fail(
+                raise file_error(
                     self.path,
-                    f"{name[:40]!r} is no bone with dof in {self.skeleton.path.name}, or comes "
+                    f"{name[:40]!r} is not a bone with dof in {self.skeleton.path.name}, or comes "
                     "twice; is this the right skeleton?",
                     line,
                 )
@@ -186,10 +190,10 @@ class _AmcReader:
             expected = (
                 f"bone {self._order[at][1].name!r}" if at < len(self._order) else "a frame number"
             )
-            raise fail(self.path, f"expected {expected}, found {_word(words[0])}", line)
+            raise file_error(self.path, f"expected {expected}, found {_word(words[0])}", line)
         channels = self._order[at][1].channels
         if len(words) != len(channels) + 1:
-            raise fail(
+            raise file_error(
                 self.path,
                 f"expected {len(channels)} numbers after {_word(words[0])}, found {len(words) - 1}",
                 line,
@@ -198,7 +202,7 @@ class _AmcReader:
             self._values.extend(map(float, words[1:]))
         except ValueError:
             wrong = next(word for word in words[1:] if number(word) is None)
-            raise fail(self.path, bad_number(wrong), line) from None
+            raise file_error(self.path, bad_number(wrong), line) from None
 
     def _tables(self) -> list[FloatArray]:
         values = np.frombuffer(self._values).reshape(self.frames, -1)
@@ -211,7 +215,7 @@ class _AmcReader:
             if not np.all(believable):
                 row = int(np.argmin(believable))
                 wrong = next(x for x in table[row] if not abs(x) <= MAX_NUMBER)
-                raise fail(
+                raise file_error(
                     self.path,
                     f"frame {self._last - self.frames + 1 + row}, bone {bone.name!r}: "
                     f"{bad_number(str(wrong))}",
@@ -234,16 +238,19 @@ def _rotation(skeleton: AsfSkeleton, index: int, table: FloatArray, radians: flo
     ]
     angles = table[:, [column for _, column in columns]] * radians
     frame = skeleton.frame(bone)
-    return multiply(multiply(frame, turns([axis for axis, _ in columns], angles)), conjugate(frame))
+    return multiply(
+        multiply(frame, rotations_about_axes([axis for axis, _ in columns], angles)),
+        conjugate(frame),
+    )
 
 
 def _check_rigid(path: Path, skeleton: AsfSkeleton, tables: list[FloatArray]) -> None:
-    """Refuse bones that travel or stretch: a skeleton of rigid bones does not."""
+    """Refuse bones that move away or stretch: rigid bones do not."""
     slack = _RIGID * max(float(np.linalg.norm(bone.vector)) for bone in skeleton.bones)
     for bone, table in list(zip(skeleton.bones, tables, strict=True))[1:]:
         moving = [column for column, name in enumerate(bone.channels) if name[0] != "r"]
         if np.any(np.abs(table[:, moving]) > slack):
-            raise fail(
+            raise file_error(
                 path,
                 f"bone {bone.name!r} changes its place or length (tx, ty, tz or l); only the root "
                 "may travel",
@@ -251,7 +258,7 @@ def _check_rigid(path: Path, skeleton: AsfSkeleton, tables: list[FloatArray]) ->
 
 
 def _find_asf(path: Path) -> AsfSkeleton:
-    """The skeleton of an AMC file that was told none; see `read_asf_amc`."""
+    """The skeleton of an AMC file for which none is given; see `read_asf_amc`."""
     stem = path.stem.lower()
     for folder in (path.parent, path.parent.resolve().parent):
         try:
@@ -270,8 +277,8 @@ def _find_asf(path: Path) -> AsfSkeleton:
         skeletons = [read_asf(file) for file in found]
         if all(skeletons[0].resembles(other) for other in skeletons[1:]):
             return max(skeletons, key=AsfSkeleton.size)
-        raise fail(
+        raise file_error(
             path,
-            f"which skeleton it belongs to is not clear: {', '.join(map(str, found))}; tell one",
+            f"which skeleton it belongs to is not clear: {', '.join(map(str, found))}; give one",
         )
-    raise fail(path, f"no ASF skeleton in {path.parent} nor one folder up; tell one")
+    raise file_error(path, f"no ASF skeleton in {path.parent} nor one folder up; give one")

@@ -14,19 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.motion.readers.angles import turns
+from dynresp.motion.readers.angles import rotations_about_axes
 from dynresp.motion.readers.skeleton import MAX_JOINTS, SkeletonMotion
 from dynresp.motion.readers.text import (
     check_size,
     decode,
-    fail,
+    file_error,
     number,
     number_table,
     numbers,
     rate_of_frame_time,
     read_bounded,
 )
-from dynresp.motion.readers.world import check_told, to_world
+from dynresp.motion.readers.world import check_options, to_world
 from dynresp.motion.rotations import FloatArray, multiply, normalize, rotate
 
 _MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION\b", re.IGNORECASE)
@@ -81,15 +81,15 @@ def read_bvh(
         MotionFileError: If the file is damaged, too large or no BVH, or the unit is not clear.
     """
     path = Path(path)
-    check_told(unit, up, fps)
+    check_options(unit, up, fps)
     data = read_bounded(path)
     motion = _MOTION.search(data)
     if motion is None or motion.start() > _MAX_HEADER_BYTES:
-        raise fail(path, "has no line MOTION after its hierarchy; expected a BVH file")
+        raise file_error(path, "has no line MOTION after its hierarchy; expected a BVH file")
     joints = _hierarchy(path, decode(data[: motion.start()]))
     columns = sum(len(joint.channels or ()) for joint in joints)
     if columns == 0:
-        raise fail(path, "no joint has channels, so nothing moves")
+        raise file_error(path, "no joint has channels, so nothing moves")
     frames, found_fps, start = _clock(path, data, motion.end(), fps)
     check_size(path, frames, len(joints))
     line = 1 + data.count(b"\n", 0, start)
@@ -109,14 +109,14 @@ def _hierarchy(path: Path, text: str) -> list[_Joint]:
             keyword = keyword.upper()
             if piece == "{":
                 if pending is None:
-                    raise fail(path, "a brace opens without a joint before it", line)
+                    raise file_error(path, "a brace opens without a joint before it", line)
                 open_joints.append(pending)
                 pending = None
             elif pending is not None:
-                raise fail(path, f"expected '{{' after {joints[pending].name!r}", line)
+                raise file_error(path, f"expected '{{' after {joints[pending].name!r}", line)
             elif piece == "}":
                 if not open_joints:
-                    raise fail(path, "a brace closes that was not opened", line)
+                    raise file_error(path, "a brace closes that was not opened", line)
                 open_joints.pop()
             elif keyword in ("ROOT", "JOINT", "END"):
                 joints.append(_new_joint(path, line, keyword, rest, joints, open_joints))
@@ -124,7 +124,7 @@ def _hierarchy(path: Path, text: str) -> list[_Joint]:
             elif keyword in ("OFFSET", "CHANNELS") and open_joints:
                 _describe(path, line, keyword, rest, joints[open_joints[-1]])
             elif keyword != "HIERARCHY" or joints:
-                raise fail(
+                raise file_error(
                     path,
                     f"expected ROOT, JOINT, End Site, OFFSET, CHANNELS or a brace, found "
                     f"{piece[:40]!r}",
@@ -132,7 +132,7 @@ def _hierarchy(path: Path, text: str) -> list[_Joint]:
                 )
     if pending is not None or open_joints or not joints:
         what = "has braces left open" if joints else "has no ROOT; expected a BVH file"
-        raise fail(path, what, line)
+        raise file_error(path, what, line)
     return joints
 
 
@@ -140,15 +140,15 @@ def _new_joint(
     path: Path, line: int, keyword: str, name: str, joints: list[_Joint], open_joints: list[int]
 ) -> _Joint:
     if len(joints) >= MAX_JOINTS:
-        raise fail(path, f"has more than {MAX_JOINTS} joints", line)
+        raise file_error(path, f"has more than {MAX_JOINTS} joints", line)
     if keyword == "ROOT":
         if joints:
-            raise fail(path, "has a second ROOT; one skeleton a file is read", line)
+            raise file_error(path, "has a second ROOT; one skeleton a file is read", line)
     elif not open_joints:
-        raise fail(path, f"{keyword} stands outside of the ROOT's braces", line)
+        raise file_error(path, f"{keyword} stands outside of the ROOT's braces", line)
     parent = open_joints[-1] if open_joints else -1
     if parent >= 0 and joints[parent].is_end:
-        raise fail(path, "an End Site cannot have a joint below it", line)
+        raise file_error(path, "an End Site cannot have a joint below it", line)
     taken = {joint.name for joint in joints}
     if keyword == "END":
         name = base = f"{joints[parent].name}_end"
@@ -157,7 +157,7 @@ def _new_joint(
             name, count = f"{base}{count}", count + 1
     elif not name or name in taken:
         what = "a second joint is called" if name else "a joint needs a name, not"
-        raise fail(path, f"{what} {name!r}", line)
+        raise file_error(path, f"{what} {name!r}", line)
     return _Joint(name, parent, line, is_end=keyword == "END")
 
 
@@ -166,16 +166,16 @@ def _describe(path: Path, line: int, keyword: str, rest: str, joint: _Joint) -> 
     words = rest.split()
     if keyword == "OFFSET":
         if len(words) != 3 or joint.offset is not None:
-            raise fail(path, f"{joint.name!r} needs one OFFSET of 3 numbers", line)
+            raise file_error(path, f"{joint.name!r} needs one OFFSET of 3 numbers", line)
         joint.offset = numbers(path, words, line, "OFFSET")
         return
     names = [word.lower() for word in words[1:]]
     unknown = [word for word in names if word not in _CHANNELS]
     if unknown:
         known = ", ".join(name.capitalize() for name in _CHANNELS)
-        raise fail(path, f"unknown channel {unknown[0][:40]!r}; known are {known}", line)
+        raise file_error(path, f"unknown channel {unknown[0][:40]!r}; known are {known}", line)
     if joint.is_end or joint.channels is not None or not words or words[0] != str(len(names)):
-        raise fail(
+        raise file_error(
             path,
             f"{joint.name!r} needs one CHANNELS line, with as many channels as it says, and an End "
             "Site none",
@@ -183,7 +183,7 @@ def _describe(path: Path, line: int, keyword: str, rest: str, joint: _Joint) -> 
         )
     channels = tuple(_CHANNELS[name] for name in names)
     if len(set(channels)) != len(channels):
-        raise fail(path, f"{joint.name!r} has a channel twice", line)
+        raise file_error(path, f"{joint.name!r} has a channel twice", line)
     joint.channels = channels
 
 
@@ -192,11 +192,11 @@ def _clock(path: Path, data: bytes, start: int, fps: float | None) -> tuple[int,
     clock = _CLOCK.match(data, start)
     if clock is None:
         line = 1 + data.count(b"\n", 0, start)
-        raise fail(path, "expected 'Frames: N' and 'Frame Time: seconds' after MOTION", line)
+        raise file_error(path, "expected 'Frames: N' and 'Frame Time: seconds' after MOTION", line)
     count, seconds = clock[1], clock[2]
     if not (count.isdigit() and len(count) <= 9 and int(count) > 0):
         line = 1 + data.count(b"\n", 0, clock.start(1))
-        raise fail(
+        raise file_error(
             path, f"expected a positive number of frames, found {decode(count[:40])!r}", line
         )
     if fps is None:
@@ -204,7 +204,9 @@ def _clock(path: Path, data: bytes, start: int, fps: float | None) -> tuple[int,
         if time is None or time <= 0:
             line = 1 + data.count(b"\n", 0, clock.start(2))
             word = decode(seconds[:40])
-            raise fail(path, f"expected a positive frame time, found {word!r}; or tell fps", line)
+            raise file_error(
+                path, f"expected a positive frame time, found {word!r}; or give fps", line
+            )
         fps = rate_of_frame_time(seconds.decode("latin-1"))
     return int(count), fps, clock.end()
 
@@ -250,7 +252,9 @@ def _motion(
 def _rotation(channels: tuple[tuple[str, int], ...], table: FloatArray) -> FloatArray:
     """A joint's own rotation, (frames, 4)."""
     columns = [column for column, (kind, _) in enumerate(channels) if kind == "rotation"]
-    return turns([channels[column][1] for column in columns], np.radians(table[:, columns]))
+    return rotations_about_axes(
+        [channels[column][1] for column in columns], np.radians(table[:, columns])
+    )
 
 
 def _place(
@@ -298,7 +302,7 @@ def _carry(
         index += 1
     stretched = [joints[index] for index in moving if index > root]
     if stretched:
-        raise fail(
+        raise file_error(
             path,
             f"the position channels of {stretched[0].name!r} change its bone's length; only the "
             "root may travel (and joints that do nothing but carry the hips)",

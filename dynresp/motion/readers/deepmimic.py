@@ -14,24 +14,25 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.motion.readers.angles import turns
+from dynresp.motion.readers.angles import rotations_about_axes
 from dynresp.motion.readers.skeleton import SkeletonMotion
 from dynresp.motion.readers.text import (
     MAX_NUMBER,
     bad_number,
     check_size,
     decode,
-    fail,
+    file_error,
     rate_of_frame_time,
     read_bounded,
 )
-from dynresp.motion.readers.world import check_told, to_world
+from dynresp.motion.readers.world import check_options, to_world
 from dynresp.motion.rotations import FloatArray, identity, multiply, normalize, slerp
 
 MAX_JSON_BYTES = 16 * 2**20
 """Largest DeepMimic file that is read [bytes], 10 minutes at 30 fps: parsed JSON takes up to
 thirty times the space of its text."""
-# The times to the next frame may differ, as in a clip with a few frames left out; the longest by
+# The times to the next frame may differ, as in a clip with a few frames left out: the longest by at
+# most
 # this factor from the usual one, which bounds how long the motion gets when it is evened out.
 _MAX_STRETCH = 10.0
 # Quaternions are normalised. In clips of the release whose gaps were filled by straight lines
@@ -70,9 +71,9 @@ _ROW = 44
 def read_deepmimic(path: str | Path, *, fps: float | None = None) -> SkeletonMotion:
     """Read a DeepMimic motion file.
 
-    The format fixes the rest, so only the frame rate can be told: metres, Y up, X forward. The rest
-    pose stands with the arms hanging. Frames whose times differ (a clip with frames left out) are
-    evened out to the usual time by interpolation, unless `fps` is told.
+    Only the frame rate can be given, since the format fixes the rest: metres, Y up, X forward. The
+    rest pose stands with the arms hanging. Frames whose times differ (a clip with frames left out)
+    are evened out to the usual time by interpolation, unless `fps` is given.
 
     Args:
         path: The file.
@@ -82,7 +83,7 @@ def read_deepmimic(path: str | Path, *, fps: float | None = None) -> SkeletonMot
         MotionFileError: If the file is damaged, too large or no DeepMimic motion.
     """
     path = Path(path)
-    check_told(None, None, fps)
+    check_options(None, None, fps)
     rows = _rows(path, decode(read_bounded(path, MAX_JSON_BYTES)))
     names = [name for name, *_ in (*_HUMANOID, *_ENDS)]
     check_size(path, len(rows), len(names))
@@ -134,22 +135,22 @@ def _rows(path: Path, text: str) -> FloatArray:
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:
-        raise fail(path, f"expected DeepMimic JSON: {error.msg}", error.lineno) from error
+        raise file_error(path, f"expected DeepMimic JSON: {error.msg}", error.lineno) from error
     except RecursionError as error:
-        raise fail(path, "expected DeepMimic JSON, and it is nested too deeply") from error
+        raise file_error(path, "expected DeepMimic JSON, and it is nested too deeply") from error
     except ValueError as error:  # a number of thousands of digits
-        raise fail(path, f"expected DeepMimic JSON: {error}") from error
+        raise file_error(path, f"expected DeepMimic JSON: {error}") from error
     rows = content.get("Frames") if isinstance(content, dict) else None
     if not isinstance(rows, list) or not rows:
-        raise fail(path, 'expected DeepMimic JSON with rows of numbers under "Frames"')
+        raise file_error(path, 'expected DeepMimic JSON with rows of numbers under "Frames"')
     for index, row in enumerate(rows):
         if not isinstance(row, list) or len(row) != _ROW:
             given = f"{len(row)} numbers" if isinstance(row, list) else type(row).__name__
-            raise fail(path, f"frame {index}: expected {_ROW} numbers, found {given}")
+            raise file_error(path, f"frame {index}: expected {_ROW} numbers, found {given}")
         for value in row:
             # bool counts as int in Python, but not in a motion.
             if type(value) not in (int, float) or not abs(value) <= MAX_NUMBER:
-                raise fail(path, f"frame {index}: {bad_number(_shown(value))}")
+                raise file_error(path, f"frame {index}: {bad_number(_shown(value))}")
     return np.array(rows, dtype=np.float64)
 
 
@@ -168,13 +169,15 @@ def _local_rotations(path: Path, numbers: FloatArray) -> FloatArray:
         part = numbers[:, column : column + width]
         column += width
         if width == 1:
-            local[:, joint] = turns([2], part)
+            local[:, joint] = rotations_about_axes([2], part)
             continue
         length = np.linalg.norm(part, axis=1)
         wrong = (length < _QUATERNION_LENGTHS[0]) | (length > _QUATERNION_LENGTHS[1])
         if np.any(wrong):
             worst = int(np.argmax(wrong))
-            raise fail(path, f"frame {worst}: {name} needs a unit quaternion, found {part[worst]}")
+            raise file_error(
+                path, f"frame {worst}: {name} needs a unit quaternion, found {part[worst]}"
+            )
         local[:, joint] = normalize(part)
     return local
 
@@ -192,20 +195,20 @@ def _steps(path: Path, times: FloatArray) -> tuple[FloatArray | None, float]:
     """
     between = times[:-1] if len(times) > 1 else times
     if np.min(between) <= 0:
-        raise fail(
+        raise file_error(
             path,
-            f"frame {int(np.argmin(between))}: expected a positive time to the next frame; or tell "
-            "the fps",
+            f"frame {int(np.argmin(between))}: expected a positive time to the next frame; or give "
+            "fps",
         )
     # Of an even number of times the lower middle one, so that it is a time of the file.
     step = float(np.sort(between)[(len(between) - 1) // 2])
     if np.max(np.abs(between - step)) <= 0.01 * step:
         return None, step
     if np.max(between) > _MAX_STRETCH * step:
-        raise fail(
+        raise file_error(
             path,
             f"frame {int(np.argmax(between))} lasts {np.max(between):g} s, and the usual is "
-            f"{step:g} s; tell the fps",
+            f"{step:g} s; give fps",
         )
     clock = np.concatenate([[0.0], np.cumsum(between)])
     # A last step that is nearly full counts, and ends at the last row.

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from dynresp.motion.character import POSE_SIZE, Character, default_character
 from dynresp.motion.motion import Label, Motion
-from dynresp.motion.readers.text import MAX_FILE_BYTES, fail
+from dynresp.motion.readers.text import MAX_FILE_BYTES, file_error
 from dynresp.support.archive import TEXT, ArchiveFormat
 from dynresp.support.errors import MotionError, MotionFileError
 
@@ -74,13 +74,13 @@ def read_npz(path: str | Path, character: Character | None = None) -> Motion:
 
     Args:
         path: The file.
-        character: The character that shall play the motion; the product's own by default.
+        character: The character that is to play the motion; the product's own by default.
 
     Returns:
         The motion, bit for bit as it was written.
 
     Raises:
-        MotionFileError: The file cannot be opened, is damaged or out of bounds, is no motion of
+        MotionFileError: The file cannot be opened, is damaged or out of bounds, is not a motion of
             dynresp, or belongs to another format version or another character.
     """
     path = Path(path)
@@ -88,17 +88,17 @@ def read_npz(path: str | Path, character: Character | None = None) -> Motion:
 
 
 def _motion(path: Path, arrays: dict[str, npt.NDArray[Any]], character: Character) -> Motion:
-    """The motion that the arrays tell of, if it makes sense."""
+    """The motion that the arrays hold, if it makes sense."""
     identity = arrays["character"].item()
     if identity != character.identity:
-        raise fail(
+        raise file_error(
             path,
             f"is a motion of character {identity[:40]!r}, and this one is {character.identity!r}; "
             "import the motion again from the file that it was made from",
         )
     names, ranges = arrays["label_names"], arrays["label_ranges"]
     if len(names) != len(ranges):
-        raise fail(path, f"has {len(names)} label names but {len(ranges)} label ranges")
+        raise file_error(path, f"has {len(names)} label names but {len(ranges)} label ranges")
     labels = [Label(n, a, b) for n, (a, b) in zip(names.tolist(), ranges.tolist(), strict=True)]
     try:
         motion = Motion(
@@ -109,13 +109,13 @@ def _motion(path: Path, arrays: dict[str, npt.NDArray[Any]], character: Characte
             tuple(labels),
         )
     except MotionError as error:
-        raise fail(path, str(error)) from error
+        raise file_error(path, str(error)) from error
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(arrays["poses"][:, 3:].reshape(-1, 4), axis=1)
     wrong = ~(np.abs(lengths - 1.0) <= _UNIT_LENGTH_TOLERANCE)
     if wrong.any():
         frame, quaternion = divmod(int(np.argmax(wrong)), (POSE_SIZE - 3) // 4)
-        raise fail(
+        raise file_error(
             path,
             f"quaternions must be of unit length; number {quaternion} of frame {frame} has "
             f"the length {lengths[frame * ((POSE_SIZE - 3) // 4) + quaternion]:g}",

@@ -1,4 +1,4 @@
-"""What every motion file reader returns: a skeleton and how it moved, whatever the source."""
+"""The motion of a skeleton, which every reader of motion files returns."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class SkeletonMotion:
     A joint's rotation is that of the bones which start at it. In the rest pose every rotation is
     the identity, so at frame t the bone to joint ``c`` points along
     ``rotate(rotations[t, parents[c]], offsets[c])``. The rest pose is the one the file defines:
-    mostly a person standing with the arms out, but some sources lay every bone along one axis
+    mostly a person standing with the arms out, but in some sources every bone is along one axis
     (see `with_rest`). A point where a bone ends and nothing follows is a joint as well, named
     ``<joint>_end``; it turns with its parent.
 
@@ -168,14 +168,14 @@ class SkeletonMotion:
         return positions
 
     def with_rest(self, rest: npt.ArrayLike) -> SkeletonMotion:
-        """The same motion told from another rest pose.
+        """The same motion relative to another rest pose.
 
-        Useful where the file's own rest pose is no pose of a person: pass the rotations of a frame
-        in which the person stands straight.
+        Useful if the file's own rest pose is not the pose of a person: pass the rotations of a
+        frame in which the person stands straight.
 
         Args:
             rest: Global orientation of each joint, relative to the present rest pose, in the pose
-                that shall become the rest pose, w x y z, (joints, 4).
+                that is to become the rest pose, w x y z, (joints, 4).
 
         Returns:
             A motion with the same joint positions in every frame, whose rotations are relative to

@@ -27,12 +27,12 @@ _STANDARD_RATES = (
     *(10, 12, 12.5, 15, 16, 20, 24, 25, 30, 40, 48, 50, 60, 72, 75, 80, 90, 100, 120, 125, 144),
     *(150, 180, 200, 240, 250, 300, 400, 480, 500, 600, 960, 1000),
 )
-# Television's, asked only where none of the others fits.
+# Television's; tried only where none of the others fits.
 _TELEVISION_RATES = tuple(rate * 1000 / 1001 for rate in (24, 30, 60, 120))
 
 
-def fail(path: Path, message: str, line: int | None = None) -> MotionFileError:
-    """The error for a file: where it is wrong, and in which way.
+def file_error(path: Path, message: str, line: int | None = None) -> MotionFileError:
+    """The error for a file: where it is wrong, and how.
 
     Args:
         path: The file.
@@ -56,15 +56,17 @@ def read_bounded(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
     try:
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "no such file"
-            raise fail(path, f"{what}; expected a motion file")
+            raise file_error(path, f"{what}; expected a motion file")
         with path.open("rb") as file:
             data = file.read(limit + 1)
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
-        raise fail(path, f"cannot be read ({error})") from error
+        raise file_error(path, f"cannot be read ({error})") from error
     if len(data) > limit:
-        raise fail(path, f"is larger than {limit / 2**20:g} MiB, the largest motion file read")
+        raise file_error(
+            path, f"is larger than {limit / 2**20:g} MiB, the largest motion file read"
+        )
     if not data.strip():
-        raise fail(path, "is empty; expected a motion file")
+        raise file_error(path, "is empty; expected a motion file")
     return data
 
 
@@ -92,13 +94,13 @@ def numbers(path: Path, tokens: Iterable[str], line: int, what: str) -> list[flo
     for token in tokens:
         value = number(token)
         if value is None:
-            raise fail(path, f"{what}: {bad_number(token)}", line)
+            raise file_error(path, f"{what}: {bad_number(token)}", line)
         values.append(value)
     return values
 
 
 def number(token: str | bytes) -> float | None:
-    """The finite number of believable size that a word says, or None if it says none."""
+    """The finite number of believable size that a word stands for; None if it is not one."""
     word = token.decode("latin-1") if isinstance(token, bytes) else token
     try:
         value = float(word)
@@ -109,7 +111,7 @@ def number(token: str | bytes) -> float | None:
 
 
 def bad_number(token: str | bytes) -> str:
-    """The sentence for a word that should have been a number."""
+    """The message for a word that should have been a number."""
     word = token.decode("latin-1") if isinstance(token, bytes) else token
     word = word if len(word) <= 40 else f"{word[:40]}..."
     return f"expected a number between -{MAX_NUMBER:g} and {MAX_NUMBER:g}, found {word!r}"
@@ -140,7 +142,7 @@ def number_table(
     count = rows * columns
     # Each number takes two bytes at least; checked before memory is taken for them.
     if 2 * count - 1 > len(data) - start:
-        raise fail(path, f"is cut short: {len(data) - start} bytes cannot hold {rows} frames")
+        raise file_error(path, f"is cut short: {len(data) - start} bytes cannot hold {rows} frames")
     values = np.empty(count)
     filled = 0
     for begin, end in _pieces(data, start):
@@ -149,13 +151,15 @@ def number_table(
         if piece is None or b"_" in data[begin:end] or not np.all(np.abs(piece) <= MAX_NUMBER):
             wrong = next(word for word in words if number(word) is None)
             at = line + data.count(b"\n", start, _find_word(data, wrong, begin))
-            raise fail(path, bad_number(wrong), at)
+            raise file_error(path, bad_number(wrong), at)
         if filled + len(piece) > count:
-            raise fail(path, f"goes on after the {rows} frames of {columns} numbers it announces")
+            raise file_error(
+                path, f"goes on after the {rows} frames of {columns} numbers it announces"
+            )
         values[filled : filled + len(piece)] = piece
         filled += len(piece)
     if filled < count:
-        raise fail(
+        raise file_error(
             path,
             f"is cut short: expected {rows} frames of {columns} numbers, found "
             f"{filled // columns} frames and {filled % columns} numbers",
@@ -194,7 +198,7 @@ def check_size(path: Path, frames: int, joints: int) -> None:
         MotionFileError: If frames x joints is above `MAX_POSES`.
     """
     if frames * joints > MAX_POSES:
-        raise fail(
+        raise file_error(
             path,
             f"{frames} frames of {joints} joints are more than {MAX_POSES} joint poses, the most "
             "that is read; cut the file",

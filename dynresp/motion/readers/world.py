@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.readers.skeleton import SkeletonMotion, forward_kinematics
-from dynresp.motion.readers.text import fail
+from dynresp.motion.readers.text import file_error
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import MotionError, MotionFileError
 
 UNITS = (1.0, 0.01, 0.0254, 0.001, 0.0254 / 0.45)
 """Units found by size [m]: metre, centimetre, inch, millimetre, and CMU's 1/0.45 inch."""
 _TYPICAL_REACH = 1.25
-"""Longest way along bones from the hips to an end [m]; 1.0 to 1.5 in the adults looked at."""
+"""Longest path along bones from the hips to an end [m]; 1.0 to 1.5 in the adults looked at."""
 _REACH_RANGE = (0.5, 2.5)
 # Half-way, as a ratio, between the two units that lie closest together.
 _SURE_FACTOR = 1.5
@@ -30,15 +30,15 @@ _FEET = re.compile(r"foot|feet|ankle|toe", re.IGNORECASE)
 _HEAD = re.compile(r"head|neck", re.IGNORECASE)
 _TRUNK = re.compile(r"spine|chest|torso|thorax", re.IGNORECASE)
 _SAMPLES = 64
-# Part of the frames in which a person stands at least along the axis that is up.
+# In at least this part of the frames a person stands along the axis that is up.
 _SOMETIMES = 0.05
 
 
-def check_told(unit: float | None, up: str | None, fps: float | None) -> None:
+def check_options(unit: float | None, up: str | None, fps: float | None) -> None:
     """Refuse a unit, up axis or frame rate that makes no sense, before the file is read.
 
     Raises:
-        MotionFileError: If one is told and is not a positive number or a known axis.
+        MotionFileError: If one is given and is not a positive number or a known axis.
     """
     for what, value in (("unit", unit), ("fps", fps)):
         if value is not None and not (np.isfinite(value) and value > 0):
@@ -102,16 +102,16 @@ def to_world(
             up=up.lower(),
         )
     except MotionError as error:
-        raise fail(path, f"{error} (unit {unit:g} m, {up} up)") from error
+        raise file_error(path, f"{error} (unit {unit:g} m, {up} up)") from error
 
 
 def find_unit(
     path: Path, parents: npt.NDArray[np.int64], offsets: FloatArray, hint: float | None = None
 ) -> float:
-    """Metres per file unit, by the size of the skeleton: that of a grown person.
+    """Metres per file unit, by the size of the skeleton: that of an adult.
 
-    The size is the longest way along the bones from the hips (the first joint with two children)
-    to an end, since that does not depend on the pose in which the skeleton rests.
+    The size is the longest path along the bones from the hips (the first joint with two children)
+    to an end, since that does not depend on the rest pose.
 
     Args:
         path: The file, for errors.
@@ -131,17 +131,17 @@ def find_unit(
     with np.errstate(divide="ignore"):
         nearest = int(np.argmin(np.abs(np.log(sizes / _TYPICAL_REACH))))
     if not _REACH_RANGE[0] <= sizes[nearest] <= _REACH_RANGE[1]:
-        raise fail(
+        raise file_error(
             path,
             f"the unit is not clear: from hips to hands or feet the skeleton measures {reach:g}, "
-            "which is no person in metres, centimetres, inches or millimetres; tell the unit "
+            "which is no person in metres, centimetres, inches or millimetres; give the unit "
             "(metres per file unit)",
         )
     return UNITS[nearest]
 
 
 def _fork(parents: npt.NDArray[np.int64]) -> int:
-    """The first joint with more than one child: the hips, below joints that only carry them."""
+    """The first joint with more than one child: the hips, below joints that only move them."""
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     return int(np.argmax(children > 1))
 
@@ -164,10 +164,10 @@ def find_up(
 ) -> str:
     """Which axis of the file points up: the one along which the head is above the feet.
 
-    Looked for in frames spread over the motion, then, if the person lies or crawls, in the rest
-    pose. Where neither tells, Y, the custom of all formats read here. A person who lies most of the
-    time, always the same way round, seems to stand on the wall; so an axis along which the rest
-    pose stands, and the person too for some of the time, comes first.
+    Found from frames spread over the motion or, if the person lies or crawls, from the rest pose.
+    If neither shows it: Y, the custom of all formats read here. A person who lies most of the time,
+    always with the same side up, seems to stand on a wall; so an axis along which the rest pose
+    stands, and the person for some of the time, too, comes first.
 
     Args:
         names: Names of the joints.

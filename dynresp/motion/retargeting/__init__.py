@@ -1,1 +1,1 @@
-"""From any skeleton to the character: joints found, rotations carried over, feet on the floor."""
+"""From any skeleton to the character: find joints, carry over rotations, put feet on the floor."""

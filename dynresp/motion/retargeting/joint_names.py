@@ -1,8 +1,8 @@
-"""What the names of a skeleton's joints say: which limb, which side, which joint.
+"""Limb, side and joint from the names of a skeleton's joints.
 
-Every program has a custom of its own (LeftUpLeg, thigh.L, L_Hip, lThigh, UpperLeg_L, Bip01 L Thigh,
-lfemur, mixamorig:LeftUpLeg), yet all of them put a word for the side beside one of few words for
-the joint. Names are cut into words, and those are looked up.
+Every program has its own custom (LeftUpLeg, thigh.L, L_Hip, lThigh, UpperLeg_L, Bip01 L Thigh,
+lfemur, mixamorig:LeftUpLeg), but all of them put a word for the side beside one of few words for
+the joint. Names are split into words, and those are looked up.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ LIMB_JOINTS = {
     "elbow": ("radius", "forearm", "lowerarm", "lowarm", "farm", "armlower", "elbow"),
     "wrist": ("wrist", "radiocarpal", "hand"),
 }
-"""For each joint of a limb the words in use for it, the surer first: "shoulder" is the upper arm in
-some sources and the collar bone in others, which then have an "arm" as well."""
+"""For each joint of a limb the words in use for it, the most certain first: "shoulder" is the
+upper arm in some sources and the collar bone in others, which then have an "arm" as well."""
 
 HEAD = ("head", "skull", "skullbase", "neck")
-"""Words for the joint that moves the head, the surer first."""
+"""Words for the joint that moves the head, the most certain first."""
 
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 _SIDES = {**{side: side for side in FEET}, **{side[0]: side for side in FEET}}
-# What may follow the joint's word and says nothing: numbers, and these.
+# What may follow the joint's word and means nothing: numbers, and these.
 _TAIL = {"bend", "bone", "joint", "jnt"}
 _PARTS = {
     word: (joint, rank)
@@ -60,8 +60,8 @@ def limb_joints(names: Sequence[str]) -> dict[tuple[str, str], int]:
 
     Returns:
         Index for each (side, joint) that some name means, such as ("left", "knee"). Of several
-        names that mean the same the one with the surest word, then the one with the fewest other
-        words, then the first.
+        names that mean the same the one with the most certain word, then the one with the fewest
+        other words, then the first.
     """
     found: dict[tuple[str, str], tuple[int, int, int]] = {}
     for index, name in enumerate(names):
@@ -91,10 +91,10 @@ def _untailed(words: list[str]) -> list[str]:
 
 
 def _meaning(words: list[str]) -> tuple[str, str, int] | None:
-    """Side, word for the joint, and how many other words a name has; None if it means no limb.
+    """Side, word for the joint, and how many other words a name has; None if it is of no limb.
 
-    The joint's words end the name but for the side, so that what only hangs there (LeftHandThumb1,
-    thigh_twist_01_l, LeftFoot_end) is not taken for it.
+    The joint's words end the name but for the side, so that joints below it (LeftHandThumb1,
+    thigh_twist_01_l, LeftFoot_end) do not count as it.
     """
     marks = [i for i, word in enumerate(words) if word in _SIDES]
     if len(marks) == 1:

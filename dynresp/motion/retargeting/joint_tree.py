@@ -1,8 +1,8 @@
-"""Limbs of a skeleton whose joints' names say nothing: by how it branches and how it is built.
+"""Limbs of a skeleton whose joints' names mean nothing: from its branches and bone lengths.
 
-A limb is a branch with an equal on the other side; of its bones the two longest that follow each
-other are thigh and shank, or upper arm and forearm. People's legs are longer than their arms, their
-feet point forward, and forward tells left from right.
+A limb is a branch with an equal one on the other side; its two longest consecutive bones are thigh
+and shank, or upper arm and forearm. People's legs are longer than their arms, their feet point
+forward, and with forward known, left and right are.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class _Limb:
 
 
 def children_of(parents: npt.NDArray[np.int64]) -> list[list[int]]:
-    """For each joint the joints that hang from it."""
+    """For each joint its child joints."""
     children: list[list[int]] = [[] for _ in parents]
     for joint, parent in enumerate(parents):
         if parent >= 0:
@@ -44,7 +44,7 @@ def children_of(parents: npt.NDArray[np.int64]) -> list[list[int]]:
 
 
 def reaches(parents: npt.NDArray[np.int64], offsets: FloatArray) -> FloatArray:
-    """From each joint the longest way along bones to an end, its own bone included, (joints,)."""
+    """From each joint the longest path along bones to an end, its own bone included, (joints,)."""
     lengths = np.linalg.norm(offsets, axis=1)
     below = np.zeros(len(parents))
     for joint in range(len(parents) - 1, 0, -1):
@@ -54,7 +54,7 @@ def reaches(parents: npt.NDArray[np.int64], offsets: FloatArray) -> FloatArray:
 
 
 def longest_branch(children: list[list[int]], reach: FloatArray, joint: int) -> list[int]:
-    """The joint and what follows it on the longest way to an end."""
+    """The joint and those after it on the longest path to an end."""
     chain = [joint]
     while children[chain[-1]]:
         chain.append(max(children[chain[-1]], key=lambda child: float(reach[child])))
@@ -66,14 +66,14 @@ def find_limbs(skeleton: SkeletonMotion) -> dict[tuple[str, str], int] | None:
 
     Returns:
         Index for each (side, joint) with the joints hip, knee, ankle, shoulder, elbow and wrist;
-        None if the skeleton has not two pairs of limbs, or left and right cannot be told.
+        None if the skeleton does not have two pairs of limbs, or left and right are not clear.
     """
     pairs = sorted(_pairs(skeleton), key=lambda pair: -sum(pair[0].lengths))
     if not pairs:
         return None
     legs, others = pairs[0], pairs[1:]
-    taken = {joint for leg in legs for joint in leg.joints}
-    arms = next((pair for pair in others if not taken & {*pair[0].joints, *pair[1].joints}), None)
+    in_legs = {joint for leg in legs for joint in leg.joints}
+    arms = next((pair for pair in others if not in_legs & {*pair[0].joints, *pair[1].joints}), None)
     if arms is None:
         return None
     frames = np.linspace(0, skeleton.frames - 1, min(_SAMPLES, skeleton.frames)).astype(int)

@@ -81,7 +81,7 @@ def _follow(
     """Poses (frames, 59) that turn as the source does, and where its ankles go (frames, 2, 3)."""
     rest = skeleton.rest_positions()
     across = rest[segments.limbs["left"]["hip"]] - rest[segments.limbs["right"]["hip"]]
-    # At rest the source faces this way: left to right crossed with up.
+    # At rest the source faces in this direction: left to right crossed with up.
     forward = rotations.from_yaw(np.arctan2(-across[0], across[1]))
 
     world = np.empty((skeleton.frames, len(character.body_names), 4))
@@ -129,7 +129,7 @@ def _follow(
 def _is_ours(
     skeleton: SkeletonMotion, rest: FloatArray, forward: FloatArray, character: Character
 ) -> bool:
-    """Whether this is the character itself, as it is exported: then nothing is to be calibrated."""
+    """Whether this is the character itself, as exported: then nothing is to be calibrated."""
     if not set(character.body_names) <= set(skeleton.names):
         return False
     joints = [skeleton.names.index(name) for name in character.body_names]
@@ -172,8 +172,9 @@ def _straighten_hinges(world: FloatArray, character: Character) -> None:
 def _level_feet(world: FloatArray, character: Character, ankles: FloatArray, fps: float) -> None:
     """Turn the feet so that they are level, on average, while they stand under a straight leg.
 
-    How the sole lies under the ankle is not in the sources, and their feet rest tipped by 20
-    degrees and more (sideways, where the legs rest apart). One constant turn sets each foot right.
+    Sources do not say how the sole is oriented under the ankle, and their feet are tipped by 20
+    degrees and more in the rest pose (sideways, where the legs are spread). One constant turn
+    levels each foot.
 
     Args:
         world: (frames, 14, 4) orientations of the bodies; changed in place.
@@ -228,7 +229,7 @@ def _source_leg_length(rest: FloatArray, segments: Segments) -> float:
 def t_pose_frames(character: Character, motion: Motion) -> npt.NDArray[np.bool_]:
     """Frames (frames,) in which the character stands straight with both arms held out.
 
-    Sources begin and end with such a pose to calibrate; it is no motion of anybody.
+    Recordings begin and end with such a pose for calibration; it is not part of the motion.
     """
     states = character.kinematics(motion.poses)
     held = np.ones(len(motion), dtype=bool)

@@ -1,8 +1,8 @@
-"""Which joint of somebody else's skeleton moves which body of the character.
+"""Which joint of a source skeleton moves which body of the character.
 
-Names first, since nearly every source uses one of a few naming customs, and the skeleton's build
-where they say nothing. The tree then settles trunk, head and toes, whose number of joints differs
-from source to source.
+Names decide first, since nearly every source uses one of a few naming customs; where they mean
+nothing, the skeleton's build decides. Trunk, head and toes, whose number of joints differs between
+sources, follow from the tree.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from dynresp.motion.retargeting.joint_tree import children_of, find_limbs, longe
 from dynresp.support.errors import MotionError
 
 _CHAINS = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
-# Bones shorter than this [m] have no direction worth the name.
+# Bones shorter than this [m] have no reliable direction.
 _SHORTEST_BONE = 0.02
-# The part of the way from the hips to the base of the head that the character's abdomen covers
-# ends at 62 % and begins at 25 % (models/ragdoll.xml); its middle tells the joint that moves it.
+# The character's abdomen covers 25 to 62 % of the path from the hips to the base of the head
+# (models/ragdoll.xml); the joint at its middle moves it.
 _ABDOMEN_MIDDLE = 0.43
 
 
@@ -51,7 +51,7 @@ def find_segments(skeleton: SkeletonMotion) -> Segments:
     """Find the joints of a person's skeleton.
 
     Raises:
-        MotionError: Some joint is not there; the message names the joints that are.
+        MotionError: Some joint is missing; the message names the joints that the skeleton has.
     """
     try:
         limbs = _by_name(skeleton)
@@ -66,7 +66,7 @@ def find_segments(skeleton: SkeletonMotion) -> Segments:
     fork = _common_ancestor(skeleton, limbs["left"]["shoulder"], limbs["right"]["shoulder"])
     chest = fork
     if "neck" in words_of(skeleton.names[fork]) and skeleton.parents[fork] >= 0:
-        # Collar bones that hang from the neck do not turn with it in a person.
+        # Collar bones below the neck do not turn with it in a person.
         chest = int(skeleton.parents[fork])
     head = head_joint(skeleton.names)
     if head is None:
@@ -78,7 +78,7 @@ def _by_name(skeleton: SkeletonMotion) -> dict[str, dict[str, int]]:
     """The limbs' joints by their names.
 
     Raises:
-        MotionError: A joint is missing, or does not hang where it should.
+        MotionError: A joint is missing, or is not below the right parent.
     """
     found = limb_joints(skeleton.names)
     children = children_of(skeleton.parents)
@@ -132,7 +132,7 @@ def _check_chain(skeleton: SkeletonMotion, side: str, limb: dict[str, int]) -> N
         if a not in _ancestors(skeleton.parents, b)[1:]:
             raise MotionError(
                 f"{skeleton.name!r}: took {skeleton.names[a]!r} for the {side} {upper} and "
-                f"{skeleton.names[b]!r} for the {lower}, but the second does not hang from the "
+                f"{skeleton.names[b]!r} for the {lower}, but the second is not below the "
                 "first"
             )
         length = float(np.linalg.norm(rest[b] - rest[a]))

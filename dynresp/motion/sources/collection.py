@@ -1,6 +1,6 @@
 """Collections: named sets of public motion files that are fetched together.
 
-They are read from the files that need them, so that a collection cannot go stale.
+What they hold is read from the files that need them, so that it is always up to date.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ def collection_files(
     if name == "all":
         return [sources[file] for file in sorted(sources)]
     reactions = reactions or reactions_folder()
-    shown = sorted((examples or example_specs()).rglob("*.toml"))
+    specs = sorted((examples or example_specs()).rglob("*.toml"))
     if name == GRAPHS:
-        libraries = [file for file in shown if file.parent.name == GRAPHS]
+        libraries = [file for file in specs if file.parent.name == GRAPHS]
     else:
-        shown = [file for file in shown if file.parent.name != GRAPHS]
-        libraries = [reactions / "core.toml", *shown]
+        specs = [file for file in specs if file.parent.name != GRAPHS]
+        libraries = [reactions / "core.toml", *specs]
     if name == "full":
         libraries.append(reactions / "full.toml")
     wanted: set[str] = set()

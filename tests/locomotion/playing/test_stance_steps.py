@@ -4,7 +4,7 @@ import numpy as np
 
 from dynresp.locomotion.playing.stance_steps import keep_feet_planted
 from dynresp.motion.character import Character
-from dynresp.motion.motion import interpolate_moving
+from dynresp.motion.motion import interpolate_with_velocities
 from dynresp.motion.rotations import FloatArray
 from tests.motion.foot_samples import crouched, foot_states
 from tests.physics.samples import standing
@@ -24,7 +24,7 @@ def _carried_on(character: Character) -> tuple[FloatArray, FloatArray, FloatArra
     part = np.linspace(0.0, 1.0, 9)
     ends = [np.repeat(x[None], 9, axis=0) for x in knots]
     moving = np.repeat(velocity, 9, axis=0)
-    return knots, part, interpolate_moving(*ends, moving, -moving, part, 1.0 / 15.0)
+    return knots, part, interpolate_with_velocities(*ends, moving, -moving, part, 1.0 / 15.0)
 
 
 def test_a_foot_goes_straight_and_the_rest_is_as_it_was(character: Character) -> None:

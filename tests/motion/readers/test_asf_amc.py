@@ -146,7 +146,7 @@ class TestFindingTheSkeleton:
         (tmp_path / "ann.asf").write_text(ASF_PERSON)
         (tmp_path / "bob.asf").write_text(ASF_PERSON.replace("length 7.6", "length 8.6"))
         (tmp_path / "walk.amc").write_text(amc_person())
-        with pytest.raises(MotionFileError, match=r"not clear: .*ann\.asf, .*bob\.asf; tell one"):
+        with pytest.raises(MotionFileError, match=r"not clear: .*ann\.asf, .*bob\.asf; give one"):
             read_asf_amc(tmp_path / "walk.amc")
 
     def test_none(self, tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ class TestFindingTheSkeleton:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("ltibia", "lshin", "line 9: 'lshin' is no bone with dof in person.asf"),
+        ("ltibia", "lshin", "line 9: 'lshin' is not a bone with dof in person.asf"),
         ("2\nroot", "3\nroot", "line 11: expected frame 2, found frame '3'"),
         ("lfoot", "#", "line 11: frame 1 ends without 'lfoot'"),
         ("1\nroot", "root", "line 4: expected a frame number, found 'root'"),
@@ -188,9 +188,9 @@ def test_damaged_motions(tmp_path: Path, old: str, new: str, message: str) -> No
         ("axis 0 0 20 XYZ", "axis 0 0 20 XYY", "line 28: expected x, y and z in some order"),
         ("axis 0 0 20 XYZ", "axis 0 20", "line 28: axis needs 3 numbers, found 2"),
         ("dof rx ry rz", "dof rx rx rz", "line 29: dof takes"),
-        ("lhip lfemur", "lhip femur", ":hierarchy names 'femur', which is no bone"),
+        ("lhip lfemur", "lhip femur", ":hierarchy names 'femur', which is not a bone"),
         ("spine head", "spine head root", "bone 'root' has two parents"),
-        ("    spine head\n", "", "bone 'head' does not hang on the root"),
+        ("    spine head\n", "", "bone 'head' is not connected to the root"),
         (":bonedata", ":bones", "has no bones under :bonedata"),
         ("length 0.45", "length 0", "expected a positive length"),
         ("direction 1 0 0", "direction 1 0 inf", "line 19: direction: .* found 'inf'"),

@@ -36,13 +36,13 @@ class TestFrontDoor:
             assert read_motion_file(str(path), fps=50).fps == 50.0
 
     @pytest.mark.parametrize(
-        ("name", "told", "message"),
+        ("name", "options", "message"),
         [
             ("a.fbx", {}, r"suffix '.fbx'; known are \.bvh, \.amc, \.json, \.txt"),
             ("a", {}, "suffix ''; known are"),
             ("a.asf", {}, "a skeleton without motion"),
             ("a.bvh", {"asf_path": "b.asf"}, "only an AMC file takes an ASF skeleton"),
-            ("a.txt", {"unit": 0.01}, "do not tell unit or up"),
+            ("a.txt", {"unit": 0.01}, "leave out unit and up"),
             ("a.bvh", {"unit": 0.0}, "unit must be a positive number, not 0.0"),
             ("a.bvh", {"fps": float("nan")}, "fps must be a positive number, not nan"),
             ("a.bvh", {"up": "-y"}, "up must be one of x, y, z, not '-y'"),
@@ -52,10 +52,10 @@ class TestFrontDoor:
         ],
     )
     def test_refuses(
-        self, tmp_path: Path, name: str, told: dict[str, object], message: str
+        self, tmp_path: Path, name: str, options: dict[str, object], message: str
     ) -> None:
         with pytest.raises(MotionFileError, match=message):
-            read_motion_file(tmp_path / name, **told)  # type: ignore[arg-type]
+            read_motion_file(tmp_path / name, **options)  # type: ignore[arg-type]
 
     def test_folders_and_empty_files(self, tmp_path: Path) -> None:
         (tmp_path / "folder.bvh").mkdir()
@@ -172,11 +172,11 @@ class TestMemory:
     """Files made to take memory: refused or read in less than 1 GiB."""
 
     @staticmethod
-    def peak(path: Path, **told: float) -> tuple[bool, float]:
+    def peak(path: Path, **options: float) -> tuple[bool, float]:
         """Whether the file could be read, and the peak of memory [bytes] while it was."""
         tracemalloc.start()
         try:
-            read_motion_file(path, **told)  # type: ignore[arg-type]
+            read_motion_file(path, **options)  # type: ignore[arg-type]
             return True, tracemalloc.get_traced_memory()[1]
         except MotionFileError:
             return False, tracemalloc.get_traced_memory()[1]
@@ -239,7 +239,7 @@ def manifest() -> list[dict[str, str]]:
 @pytest.mark.mocap
 @pytest.mark.skipif(not MOTIONS, reason="DYNRESP_MOTIONS names no folder of motion capture")
 def test_every_clip_of_the_manifest() -> None:
-    """Frames, rate, unit and up axis are found as the manifest tells them, with nothing told."""
+    """Frames, rate, unit and up axis are found as the manifest tells them, with nothing given."""
     wrong = []
     for row in manifest():
         motion = read_motion_file(Path(MOTIONS, row["file"]))
