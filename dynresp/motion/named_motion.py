@@ -51,7 +51,7 @@ def load_spec_motion(
     fps: float,
     character: Character,
 ) -> NamedMotion:
-    """Load the motion that a table names, or else the one it names for want of the first.
+    """Load the motion that a table names, or the one that it names in case the first is missing.
 
     Args:
         cut: The table.
@@ -195,11 +195,11 @@ def cut_record(cut: MotionCut, found: Path | str) -> dict[str, Any]:
         cut: The table that names it.
         found: What `find_motion` found.
     """
-    told = cut.model_dump(exclude_defaults=True, by_alias=True, exclude={"otherwise", "hit_s"})
+    given = cut.model_dump(exclude_defaults=True, by_alias=True, exclude={"otherwise", "hit_s"})
     if isinstance(found, str):
-        return {**told, "built_in": True}
+        return {**given, "built_in": True}
     record: dict[str, Any] = {
-        **told,
+        **given,
         "built_in": False,
         "sha256": hashlib.sha256(found.read_bytes()).hexdigest(),
     }

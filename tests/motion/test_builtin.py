@@ -208,7 +208,7 @@ def test_plural_sets_both_sides_mirrored(tmp_path: Path, character: Character) -
         ("flexion = 20", 'flexion = "up"', "key 2.neck.flexion: .*number, got 'up'"),
         ("flexion = 20", "flexion = nan", "key 2.neck.flexion: .*finite"),
         ('foot = "left"', 'foot = "middle"', "stance 1.foot: .*'left' or 'right', got 'middle'"),
-        ("at = [0, 0.1]", "at = [0]", "stance 1.at"),
+        ("at = [0, 0.1]", "at = [0]", "stance 1.at: expected at least 2 values in brackets"),
         ("to = 1\n", "to = 0\n", "stance 1: 'to' .0. must be later than 'from'"),
         ("to = 1\n", "to = 7\n", "'to' is 7 s, but the last key is at 1 s"),
         ("time = 1", "time = 0", "keys must follow each other in time"),

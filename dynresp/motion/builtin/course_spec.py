@@ -8,11 +8,11 @@ relative to where the body is and faces, so phrases follow each other without a 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from dynresp.motion.builtin.posture_spec import Posture, Side
+from dynresp.motion.builtin.posture_spec import FromList, Posture, Side
 from dynresp.specs.shared_tables import Strict
 from dynresp.support.errors import UnknownNameError
 
@@ -36,13 +36,6 @@ Added = Annotated[Posture, AfterValidator(_no_place)]
 
 MIRRORED = " mirrored"
 """Follows the name of a phrase in the route that is played with left and right exchanged."""
-
-
-def _with_tuple(data: Any, key: str) -> Any:
-    """A table with a list as a tuple: TOML has lists only, strict mode wants tuples."""
-    if isinstance(data, dict) and isinstance(data.get(key), list):
-        return data | {key: tuple(data[key])}
-    return data
 
 
 class Step(Strict):
@@ -81,15 +74,10 @@ class Step(Strict):
     double: Seconds | None = None
     apart: Annotated[float, Field(ge=-0.2, le=0.6)] = 0.10
     lift: Annotated[float, Field(ge=0.0, le=0.6)] = 0.0
-    over: tuple[Metres, Metres] | None = None
+    over: Annotated[tuple[Metres, Metres], FromList] | None = None
     heel: Annotated[float, Field(ge=0.0, le=70.0)] | None = None
     land: Annotated[float, Field(ge=-60.0, le=40.0)] | None = None
     posture: Added = Posture()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _pair(cls, data: Any) -> Any:
-        return _with_tuple(data, "over")
 
 
 class Stay(Strict):
@@ -104,13 +92,8 @@ class Stay(Strict):
 
     do: Literal["stay"]
     time: Seconds
-    at: tuple[Metres, Metres] = (0.0, 0.0)
+    at: Annotated[tuple[Metres, Metres], FromList] = (0.0, 0.0)
     posture: Added = Posture()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _point(cls, data: Any) -> Any:
-        return _with_tuple(data, "at")
 
 
 class Jump(Strict):
@@ -146,14 +129,9 @@ class Course(Strict):
         phrases: Their moves.
     """
 
-    start: tuple[Metres, Metres, Degrees] = (0.0, 0.0, 0.0)
+    start: Annotated[tuple[Metres, Metres, Degrees], FromList] = (0.0, 0.0, 0.0)
     route: Annotated[list[str], Field(min_length=1)]
     phrases: Mapping[str, Annotated[list[Move], Field(min_length=1)]]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _start(cls, data: Any) -> Any:
-        return _with_tuple(data, "start")
 
     @model_validator(mode="after")
     def _known(self) -> Course:

@@ -7,14 +7,14 @@ degrees under anatomical names, lengths in metres, times in seconds.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from dynresp.motion.builtin.course_spec import Course
 from dynresp.motion.builtin.posture_spec import (
     CHANNELS,
-    Coordinate,
+    Point,
     Posture,
     Side,
 )
@@ -42,13 +42,6 @@ class Key(Posture):
     """A key pose: the posture at one time."""
 
     time: Time
-
-
-def _point(data: Any) -> Any:
-    """TOML has lists only; strict mode wants the pair as a tuple."""
-    if isinstance(data, dict) and isinstance(data.get("at"), list):
-        return data | {"at": tuple(data["at"])}
-    return data
 
 
 class _Span(Strict):
@@ -79,7 +72,7 @@ class Stance(_Span):
     """
 
     foot: Side
-    at: tuple[Coordinate, Coordinate]
+    at: Point
     turn: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
     heel: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     land: Annotated[float, Field(ge=-60.0, le=40.0)] = 0.0
@@ -87,8 +80,6 @@ class Stance(_Span):
     push_time: Annotated[float, Field(gt=0.0, le=2.0)] = 0.22
     by: Literal["step", "free"] = "step"
     lift: Annotated[float, Field(ge=0.0, le=0.6)] = 0.05
-
-    _point = model_validator(mode="before")(_point)
 
 
 class Lying(_Span):
@@ -106,9 +97,7 @@ class Prop(_Span):
     """
 
     hand: Side
-    at: tuple[Coordinate, Coordinate]
-
-    _point = model_validator(mode="before")(_point)
+    at: Point
 
 
 class Sway(Strict):

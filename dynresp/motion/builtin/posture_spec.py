@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from dynresp.specs.shared_tables import Strict
 
@@ -27,7 +27,16 @@ CHANNELS: tuple[str, ...] = (
 )
 """Every value that key poses set and sways move."""
 
+
+def _as_tuple(given: Any) -> Any:
+    return tuple(given) if isinstance(given, list) else given
+
+
+FromList = BeforeValidator(_as_tuple)
+"""For fields that are tuples: TOML has lists only, strict tables want tuples."""
+
 Coordinate = Annotated[float, Field(ge=-100.0, le=100.0)]
+Point = Annotated[tuple[Coordinate, Coordinate], FromList]
 Angle = Annotated[float, Field(ge=-720.0, le=720.0)]
 KneeAngle = Annotated[float, Field(ge=-5.0, le=158.0)]
 ElbowAngle = Annotated[float, Field(ge=-5.0, le=153.0)]

@@ -23,10 +23,10 @@ def load_named_library(
     """Load the reactions that an experiment chooses from.
 
     Args:
-        which: "core", "full", "builtin", or a library file (.toml). For want of the motion capture
+        which: "core", "full", "builtin", or a library file (.toml). Without the motion capture
             of "core" it is the built-in library.
         folders: Motions folders.
-        beside: Folder of the experiment file, from which a relative path counts.
+        beside: Folder of the experiment file, to which a path is relative.
         fps: Frame rate of the reactions [1/s].
         character: The character.
 
