@@ -117,9 +117,9 @@ def write_outing(
     )
 
     def plan(path: Path) -> None:
-        from dynresp.view.ground_plan import write_plan
+        from dynresp.view.ground_plan import write_ground_plan
 
-        write_plan(story, path, [at for at in outing.jumps_s or () if at <= story.duration])
+        write_ground_plan(story, path, [at for at in outing.jumps_s or () if at <= story.duration])
 
     writers = {
         **story_writers(story, character, _VIDEO_PX, _VIDEO_FPS, progress),

@@ -82,9 +82,9 @@ def choice_outing(
     picks = sum(moment["picked"] is not None for moment in told)
 
     def options(path: Path) -> None:
-        from dynresp.view.action_pictures import write_options
+        from dynresp.view.action_pictures import write_action_pictures
 
-        write_options([(action.path, action.pose) for action in offered], words, path)
+        write_action_pictures([(action.path, action.pose) for action in offered], words, path)
 
     return Outing.of(
         composition,

@@ -25,7 +25,13 @@ from dynresp.results.result_folder import WATCHING
 from dynresp.support.errors import DynrespError, MotionFileError, UsageError
 from dynresp.support.extras import require
 from dynresp.support.progress import Progress
-from dynresp.view.video_control_view import Seen, TimeLine, Watched, letter, write_watched
+from dynresp.view.video_control_view import (
+    ActionTimeline,
+    VideoControlStory,
+    VideoMoment,
+    letter,
+    write_video_control,
+)
 
 # A video must go on for so long after the empty room [s].
 _LEAST_S = 0.5
@@ -202,7 +208,7 @@ class _Reel:
     def __init__(self, pictures: Iterable[Picture], asked: VideoAsked, progress: Progress) -> None:
         self.count = 0
         self.waited_s = 0.0
-        self.moments: list[Seen] = []
+        self.moments: list[VideoMoment] = []
         self._pictures = iter(pictures)
         self._asked, self._progress = asked, progress
         self._last: Picture | None = None
@@ -252,7 +258,7 @@ class _Reel:
         assert self._last is not None
         height, width = step.mask.shape
         small = cv2.resize(self._last, (width, height), interpolation=cv2.INTER_AREA)
-        self.moments.append(Seen(step.time_s, np.asarray(small, dtype=np.uint8), step.mask))
+        self.moments.append(VideoMoment(step.time_s, np.asarray(small, dtype=np.uint8), step.mask))
         if len(self.moments) >= 2 * _KEPT:
             self.moments = self.moments[::2]
             self._every *= 2
@@ -281,10 +287,10 @@ def _outing(
     together = float(np.mean([a == b for a, b in seen]))
     words = [in_words(graph, clusters.labels == k) for k in range(len(clusters))]
     examples = graph.database.poses[clusters.examples]
-    watched = Watched(
+    watched = VideoControlStory(
         motion=composition.motion,
         moments=reel.moments,
-        line=TimeLine(times, told, chosen, avatar),
+        line=ActionTimeline(times, told, chosen, avatar),
         poses=examples,
         words=words,
     )
@@ -295,7 +301,7 @@ def _outing(
     )
 
     def picture(out: Path) -> None:
-        write_watched(watched, out, title, subtitle)
+        write_video_control(watched, out, title, subtitle)
 
     database = graph.database
     about = [

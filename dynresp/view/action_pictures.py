@@ -1,4 +1,4 @@
-"""The picture of a few actions to choose from: their ways from above, and where they lead."""
+"""The picture of a few actions to choose from: their paths from above, and a pose of each."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ _COLORS = ((0.16, 0.42, 0.70), (0.85, 0.40, 0.13), (0.20, 0.58, 0.40), (0.55, 0.
 _DPI = 130
 _SIZE = (11.0, 6.2)  # [inch]
 _PLAN = (0.06, 0.09, 0.41, 0.82)
-# Of the plan: margin, arrow, radius of a number, and how far from an end numbers may be [inch].
+# On the plan: margin, arrow, radius of a number, and distances of numbers from ends [inch].
 _MARGIN, _ARROW, _RADIUS = 0.45, 0.3, 0.14
 _REACHES = (0.25, 0.32, 0.4, 0.5, 0.65, 0.8)
 PIXEL_M = 0.006
 """Size of a pixel of `pose_picture` [m]."""
-# The camera stands a little to the side of where a figure faces, and looks down a little [rad].
+# The camera stands this far to the side of the figure's front, and looks down this far [rad].
 _ASIDE, _DOWN = np.radians(30.0), np.radians(12.0)
 
 
-def write_options(
+def write_action_pictures(
     actions: Sequence[tuple[FloatArray, FloatArray]], words: Sequence[str], path: Path | str
 ) -> None:
     """Write the picture of actions as a PNG; the file is whole or not there.
 
     Args:
-        actions: For each its way, (s, 4) x, y, z [m] and yaw [rad], and the pose (59,) that stands
+        actions: For each its path, (s, 4) x, y, z [m] and yaw [rad], and a pose (59,) that stands
             for it.
-        words: What each is, in words.
+        words: What each action is.
         path: The file; missing folders are made.
 
     Raises:
@@ -61,7 +61,7 @@ def write_options(
         cell.set_axis_off()
         picture = pose_picture(pose)
         cell.imshow(picture, interpolation="nearest")
-        # A column of all figures' width, so that they are of one size.
+        # All figures to one scale.
         middle = picture.shape[1] / 2
         half = 0.75 / PIXEL_M
         cell.set_xlim(middle - half, middle + half)
@@ -75,11 +75,11 @@ def write_options(
 
 
 def _draw_plan(axes: Axes, ways: Sequence[FloatArray]) -> None:
-    """Ways from above, each with its number at a free place near its end."""
+    """Draw paths from above, each with its number near its end, where there is room."""
     points = np.concatenate([way[:, :2] for way in ways])
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.array(_PLAN[2:]) * _SIZE
-    # Metres an inch: all ways with a margin, and no less than a metre and a half across.
+    # Metres per inch: all paths with a margin, and at least 1.5 m across.
     scale = max(float(((high - low) / (size - 2.0 * _MARGIN)).max()), 1.5 / float(size.min()))
     corner = 0.5 * (low + high) - 0.5 * scale * size
     axes.set_xlim(corner[0], corner[0] + scale * size[0])
@@ -91,15 +91,15 @@ def _draw_plan(axes: Axes, ways: Sequence[FloatArray]) -> None:
     count, arrow = len(ways), _ARROW * scale
     for number, way in enumerate(ways):
         color = _COLORS[number % len(_COLORS)]
-        # Where they go the same way, the wider ones show beside those that lie on them.
+        # Where paths coincide, the wider ones show beside those drawn over them.
         axes.plot(*way[:, :2].T, color=color, lw=1.6 + 1.3 * (count - 1 - number))
     start = ways[0][0]
     _arrow(axes, start, 1.2 * arrow, _INK)
     axes.plot(*start[:2], ls="", marker="o", ms=9, mfc="white", mec=_INK, mew=1.5)
     ends = np.array([way[-1] for way in ways])
     tips = ends[:, :2] + arrow * np.column_stack([np.cos(ends[:, 3]), np.sin(ends[:, 3])])
-    taken = np.concatenate([points, tips, 0.5 * (tips + ends[:, :2])])
-    badges = _free_places((ends[:, :2] - corner) / scale, (taken - corner) / scale, size)
+    occupied = np.concatenate([points, tips, 0.5 * (tips + ends[:, :2])])
+    badges = _free_places((ends[:, :2] - corner) / scale, (occupied - corner) / scale, size)
     for number, (end, badge) in enumerate(zip(ends, corner + scale * badges, strict=True)):
         color = _COLORS[number % len(_COLORS)]
         axes.plot(*np.column_stack([end[:2], badge]), color=color, lw=0.8)
@@ -111,13 +111,13 @@ def _draw_plan(axes: Axes, ways: Sequence[FloatArray]) -> None:
                   ha="center", va="center", bbox=round_it, zorder=5)  # fmt: skip
 
 
-def _free_places(ends: FloatArray, taken: FloatArray, size: FloatArray) -> FloatArray:
-    """(k, 2) places for numbers near ends (k, 2), where nothing lies, on a sheet of a size [inch].
+def _free_places(ends: FloatArray, occupied: FloatArray, size: FloatArray) -> FloatArray:
+    """(k, 2) free places for numbers near ends (k, 2), on a sheet of a size [inch].
 
     Args:
-        ends: What the numbers belong to.
-        taken: (p, 2) what they should not cover.
-        size: (2,) of the sheet, from 0.
+        ends: (k, 2) the points that the numbers belong to.
+        occupied: (p, 2) points that the numbers should not cover.
+        size: (2,) of the sheet.
     """
     angles = np.arange(24) * np.pi / 12.0
     around = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -125,7 +125,7 @@ def _free_places(ends: FloatArray, taken: FloatArray, size: FloatArray) -> Float
     for end in ends:
         tried = (end + np.array(_REACHES)[:, None, None] * around).reshape(-1, 2)
         far = np.repeat(_REACHES, len(angles))
-        to_others = np.linalg.norm(tried[:, None] - taken, axis=2).min(axis=1)
+        to_others = np.linalg.norm(tried[:, None] - occupied, axis=2).min(axis=1)
         cost = far + 10.0 * np.maximum(_RADIUS - to_others, 0.0)
         if places:
             to_badges = np.linalg.norm(tried[:, None] - np.array(places), axis=2).min(axis=1)
@@ -137,7 +137,7 @@ def _free_places(ends: FloatArray, taken: FloatArray, size: FloatArray) -> Float
 
 
 def _arrow(axes: Axes, at: FloatArray, length: float, color: shapes.Color) -> None:
-    """An arrow that shows where one faces at (4,) x, y, z [m] and yaw [rad]."""
+    """Draw an arrow in the direction of yaw [rad] at (4,) x, y, z [m], yaw."""
     x, y, _, yaw = (float(v) for v in at)
     tip = (x + length * math.cos(yaw), y + length * math.sin(yaw))
     style = {"arrowstyle": "-|>", "color": color, "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
@@ -145,7 +145,7 @@ def _arrow(axes: Axes, at: FloatArray, length: float, color: shapes.Color) -> No
 
 
 def _cell(number: int, count: int) -> tuple[float, float, float, float]:
-    """Place of a figure: two columns on the right."""
+    """Where a figure is drawn: in two columns on the right."""
     rows = max(1, -(-count // 2))
     row, column = divmod(number, 2)
     height = 0.86 / rows
@@ -153,13 +153,13 @@ def _cell(number: int, count: int) -> tuple[float, float, float, float]:
 
 
 def pose_picture(pose: FloatArray) -> npt.NDArray[np.uint8]:
-    """A person in a pose, seen from ahead and a little aside.
+    """A person in a pose, seen from the front and a little from the side.
 
     Args:
         pose: (59,).
 
     Returns:
-        (height, width, 4) red, green, blue, alpha; `PIXEL_M` a pixel, no larger than the person.
+        (height, width, 4) red, green, blue, alpha, 0 to 255; a pixel is `PIXEL_M` wide.
     """
     from dynresp.motion import rotations
 
@@ -171,5 +171,5 @@ def pose_picture(pose: FloatArray) -> npt.NDArray[np.uint8]:
     view = raster.Projection.looking(yaw, float(_DOWN))
     layer = raster.draw(meshes, view, PIXEL_M)
     canvas = raster.Canvas(layer.left, layer.top, layer.rgba.shape[1], layer.rgba.shape[0])
-    canvas.lay(layer, 0, 0, 1.0)
+    canvas.paste(layer, 0, 0, 1.0)
     return canvas.picture()

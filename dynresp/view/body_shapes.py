@@ -1,9 +1,9 @@
-"""What the character looks like: the solids that every view draws, and their colours.
+"""The shape and the colours of the character, as every view draws it.
 
-Each body is drawn as the tight skin around its geoms of `models/ragdoll.xml` (the convex hull of
-their balls) and around a rounded filler at each of its joints, so that trunk and limbs taper and a
-bent character shows no gaps. The skin holds the geoms, so where it touches, they do, to about a
-centimetre; the fillers are for the eye alone. Colours are those of the model file.
+Each body is drawn as the convex hull of its geoms in `models/ragdoll.xml` and of a ball at each of
+its joints, so that trunk and limbs taper and a bent character shows no gaps. The hull contains the
+geoms: where it touches something, they do, to about a centimetre. The balls at the joints are only
+drawn. Colours are those of the model file.
 """
 
 from __future__ import annotations
@@ -38,12 +38,13 @@ BALL_COLOR: Color = (0.85, 0.33, 0.10)
 CAPSULE_COLOR: Color = (0.35, 0.30, 0.38)
 BLOCK_COLOR: Color = (0.72, 0.62, 0.48)
 PATH_COLORS: tuple[Color, ...] = ((0.16, 0.42, 0.70), (0.25, 0.62, 0.45))
-"""Of what is drawn on the ground, one after the other; then again from the first."""
+"""Of lines on the ground, in turn."""
 BOUNDS_COLOR: Color = (0.55, 0.46, 0.34)
-# Shirts of the further characters.
+# Shirts of the other characters.
 _OTHER_SHIRTS: tuple[Color, ...] = ((0.55, 0.30, 0.48), (0.42, 0.50, 0.25), (0.62, 0.45, 0.22))
 
-# Balls for the eye: body, centre in its frame [m], radius [m]; those off the middle come twice.
+# Balls that are only drawn: body, centre in its frame [m], radius [m]; those off the middle on both
+# sides.
 _FILLERS: tuple[tuple[str, tuple[float, float, float], float], ...] = (
     ("pelvis", (0.0, 0.085, 0.004), 0.088),
     ("pelvis", (0.0, 0.055, 0.146), 0.092),
@@ -63,8 +64,8 @@ _FILLERS: tuple[tuple[str, tuple[float, float, float], float], ...] = (
     ("shank", (0.0, 0.0, -0.430), 0.042),
     ("foot", (0.0, 0.0, -0.010), 0.039),
 )
-# Geoms with a skin of their own beside the rest of their body, in which a joint would be lost.
-_APART = ("neck", "left_hand", "right_hand")
+# Geoms with a hull of their own: in the hull of the whole body their joint would not show.
+_OWN_HULL = ("neck", "left_hand", "right_hand")
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 # Radius of the edges of boxes [m].
 _ROUNDING = 0.008
@@ -80,7 +81,7 @@ class Mesh:
         vertices: (v, 3) [m].
         normals: (v, 3) unit vectors, outward.
         faces: (f, 3) indices of vertices, counter-clockwise from outside.
-        color: Of the whole.
+        color: One for all triangles.
     """
 
     vertices: FloatArray
@@ -89,7 +90,7 @@ class Mesh:
     color: Color
 
     def placed(self, position: FloatArray, quaternion: FloatArray) -> Mesh:
-        """Turned by a quaternion (w x y z), then shifted."""
+        """The mesh turned by a quaternion (w x y z), then shifted."""
         return replace(
             self,
             vertices=position + rotations.rotate(quaternion, self.vertices),
@@ -104,7 +105,7 @@ class Solid:
     Attributes:
         name: Unique name.
         body: Index of its body, as in `Character.body_names`.
-        part: What it is dressed as.
+        part: Skin or clothes.
         mesh: In the frame of the body, coloured as in the model file.
     """
 
@@ -127,7 +128,7 @@ def character_solids(character: Character) -> tuple[Solid, ...]:
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom]) - 1
         name = model.geom(geom).name
-        solid = name if name in _APART else character.body_names[body]
+        solid = name if name in _OWN_HULL else character.body_names[body]
         red, green, blue, _ = (float(x) for x in model.geom_rgba[geom])
         look.setdefault(solid, (body, _part(character.body_names[body]), (red, green, blue)))
         balls.setdefault(solid, []).extend(_balls(model, geom))
@@ -145,13 +146,13 @@ def character_solids(character: Character) -> tuple[Solid, ...]:
 def place(
     solids: Sequence[Solid], states: BodyStates, frame: int, colors: Sequence[Color]
 ) -> list[Mesh]:
-    """The solids of a character where they are at one frame, in the world.
+    """The solids of a character in the world, at one frame.
 
     Args:
         solids: From `character_solids`.
         states: The character's bodies over some frames.
         frame: Which of them.
-        colors: One a solid.
+        colors: One for each solid.
     """
     return [
         replace(solid.mesh, color=color).placed(
@@ -162,7 +163,7 @@ def place(
 
 
 def phase_colors(solids: Sequence[Solid], phase: PhaseName | None, share: float) -> list[Color]:
-    """Colours of the solids with the clothes dyed in the colour of a phase; skin and shoes stay.
+    """Colours of the solids, the clothes dyed in the colour of a phase; skin and shoes are not.
 
     Args:
         solids: From `character_solids`.
@@ -177,7 +178,7 @@ def phase_colors(solids: Sequence[Solid], phase: PhaseName | None, share: float)
 
 
 def other_colors(solids: Sequence[Solid], number: int) -> list[Color]:
-    """Colours of the solids of further character `number` (from 0), in another shirt."""
+    """Colours of the solids of another character, `number` from 0, in another shirt."""
     shirt = _OTHER_SHIRTS[number % len(_OTHER_SHIRTS)]
     return [shirt if solid.part == "shirt" else solid.mesh.color for solid in solids]
 
@@ -222,13 +223,13 @@ def box(half_sizes: Sequence[float], color: Color) -> Mesh:
 
 
 def ribbon(points: FloatArray, width: float, height: float, color: Color) -> Mesh:
-    """A band that lies on the ground along a line, of one flat bar for each of its stretches.
+    """A band on the ground along a line: one flat bar for each of its segments.
 
     Args:
         points: (n, 2) corners of the line [m]; those at one place with their neighbour do nothing.
         width: Of the band [m].
         height: How high it stands above the ground [m].
-        color: Of the whole.
+        color: One for all triangles.
     """
     bars: list[Mesh] = []
     for a, b in itertools.pairwise(points):
@@ -258,7 +259,7 @@ def hull(balls: Sequence[tuple[FloatArray, float]], color: Color, detail: int = 
 
     Args:
         balls: Centres (3,) and radii [m].
-        color: Of the whole.
+        color: One for all triangles.
         detail: How often the twenty faces of an icosahedron are quartered for one ball.
     """
     from scipy.spatial import ConvexHull
@@ -280,7 +281,7 @@ def hull(balls: Sequence[tuple[FloatArray, float]], color: Color, detail: int = 
 
 @functools.cache
 def _sphere_points(detail: int) -> FloatArray:
-    """Corners of an icosahedron whose faces were quartered `detail` times, on the unit sphere."""
+    """Corners of an icosahedron, its faces divided into four `detail` times, on the unit sphere."""
     golden = (1 + 5**0.5) / 2
     points = np.array(
         [np.roll((0.0, a, b * golden), k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
@@ -299,7 +300,7 @@ def _sphere_points(detail: int) -> FloatArray:
 
 
 def _balls(model: mujoco.MjModel, geom: int) -> list[tuple[FloatArray, float]]:
-    """The balls of whose hull a geom consists, in its body's frame; a box has its edges rounded."""
+    """The balls whose hull is a geom, in its body's frame; the edges of a box are rounded."""
     size, kind = model.geom_size[geom], model.geom_type[geom]
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
         radius = min(_ROUNDING, float(size.min()))

@@ -1,4 +1,4 @@
-"""The plan: a way over the ground as seen from above."""
+"""The ground plan of a story: the path of the character, obstacles and lines, from above."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ _DPI = 150
 _LONG, _SHORT = 10.0, 4.0
 # Heights of the heading and of the legend [inch].
 _HEADING, _LEGEND = 0.55, 0.35
-# An arrow in this interval shows where the character faces [s], but no more than so many, and each
-# as long as this share of the longer side.
+# Arrows show where the character faces: their interval [s], their largest number, and their length
+# as a share of the longer side.
 _ARROW_S, _MOST_ARROWS, _ARROW = 1.0, 80, 0.03
 
 
-def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> None:
+def write_ground_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> None:
     """Write the plan of a story as a PNG; the file is whole or not there.
 
-    It shows the bounds of the world, the ways drawn on the ground, blocks and bars, the way of the
-    main character's pelvis with arrows that show where it faces, in a short walk second by second,
-    its start and its end.
+    It shows the bounds of the world, lines on the ground, blocks and bars, and the path of the main
+    character's pelvis with its start, its end, and arrows that show where the character faces: one
+    a second in a short walk.
 
     Args:
         story: What is shown.
         path: The file; missing folders are made.
-        marks: Times [s] at which the way is marked by a dot, such as its jumps.
+        marks: Times [s] at which the path gets a dot, such as jumps.
 
     Raises:
         DynrespError: The file cannot be written.
@@ -70,7 +70,7 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
     axes.set_xlabel("x [m]", fontsize=8, color=_FAINT_INK)
     axes.set_ylabel("y [m]", fontsize=8, color=_FAINT_INK)
     if corners:
-        # The higher a block the darker, but light enough for the way that is drawn over it.
+        # Higher blocks are darker, but light enough for the path that is drawn over them.
         highest = max(1e-6, *(block.top for block in story.blocks))
         tops = [max(block.top, 0.0) / highest for block in story.blocks]
         light = mix(BLOCK_COLOR, (1.0, 1.0, 1.0), 0.75)
@@ -88,8 +88,8 @@ def write_plan(story: Story, path: Path | str, marks: Sequence[float] = ()) -> N
         axes.plot(*line.points.T, color=color, lw=3.5, alpha=0.45, label=line.name,
                   solid_capstyle="round")  # fmt: skip
     axes.plot(*track.T, color=_TRACK, lw=1.3, label="pelvis")
-    apart = max(_ARROW_S, story.duration / _MOST_ARROWS)
-    step = max(1, round(apart * story.motion.fps))
+    interval = max(_ARROW_S, story.duration / _MOST_ARROWS)
+    step = max(1, round(interval * story.motion.fps))
     yaws = np.asarray(rotations.yaw_of(story.motion.root_quaternions[::step]))
     axes.quiver(*track[::step].T, np.cos(yaws), np.sin(yaws), angles="xy", scale_units="xy",
                 scale=1.0 / (_ARROW * max(wide, deep)), width=0.0022, color=_INK,
@@ -123,7 +123,7 @@ def _corners(block: Block) -> np.ndarray:
 
 
 def _bar(rod: MovingCapsule) -> np.ndarray | None:
-    """(2, 2) the ends of a capsule on the ground as it is at first; None if it is not there."""
+    """(2, 2) the ends of a capsule at the first frame, from above; None if it is absent."""
     at = row_at(rod.positions, 0)
     if at is None:
         return None

@@ -1,4 +1,4 @@
-"""Where figures and their labels go so that they do not cover each other, along one line."""
+"""Figures and labels placed along a line so that they do not cover each other."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from dynresp.motion.rotations import FloatArray
 
 
-def spread(extents: FloatArray, overlap: float, gap: float = np.inf) -> FloatArray:
-    """How far to move figures to the right so that each stands clear of the one before.
+def spread_figures(extents: FloatArray, overlap: float, gap: float = np.inf) -> FloatArray:
+    """Move figures to the right until each stands clear of the one before.
 
     Args:
         extents: (n, 2) left and right edges, in the order of time.
-        overlap: Share of the narrower figure of two that may be covered.
-        gap: Figures farther from the one before than this are moved up to it.
+        overlap: Share of the narrower of two figures that may be covered.
+        gap: A figure farther from the one before than this is moved closer to it.
 
     Returns:
-        (n,) shifts, from 0; none smaller than the one before where there is no bound on gaps.
+        (n,) shifts; the first is 0. Without a bound on gaps none is smaller than the one before.
     """
     widths = extents[:, 1] - extents[:, 0]
     shifts = np.zeros(len(extents))
@@ -27,8 +27,8 @@ def spread(extents: FloatArray, overlap: float, gap: float = np.inf) -> FloatArr
     return shifts
 
 
-def settle(anchors: FloatArray, widths: FloatArray) -> FloatArray:
-    """Centres of labels that do not overlap, as near to their anchors as can be (least squares).
+def place_labels(anchors: FloatArray, widths: FloatArray) -> FloatArray:
+    """Centres of labels that do not overlap, as near to their anchors as possible (least squares).
 
     Args:
         anchors: (n,) where each label would be.
@@ -41,7 +41,7 @@ def settle(anchors: FloatArray, widths: FloatArray) -> FloatArray:
 
     order = np.argsort(anchors, kind="stable")
     ordered = widths[order]
-    # Less the room of the labels before it, a label need only not be left of its neighbour.
+    # With the widths of the labels before it taken off, a label only has to follow its neighbour.
     room = np.cumsum(ordered) - 0.5 * ordered
     free = isotonic_regression(anchors[order] - room).x
     centers = np.empty_like(anchors)

@@ -1,7 +1,7 @@
-"""Pictures of solids in plain NumPy, for machines that have no graphics at all.
+"""A small renderer in plain NumPy, for machines without graphics.
 
-A parallel projection, one light, soft shadows on the floor z = 0. All triangles are turned into
-pixels at once, and each pixel keeps the one nearest to the camera.
+A parallel projection, one light, soft shadows on the floor z = 0. All triangles become pixels at
+once, and each pixel keeps the triangle nearest to the camera.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from dynresp.view.body_shapes import Mesh
 _LIGHT = np.array([-0.48, 0.66, 0.58])
 _LIGHT = _LIGHT / np.linalg.norm(_LIGHT)
 
-# Shadows: heights [m] between which parts of a body count, how far their edge is blurred [m] and
-# how dark they are. What is higher throws a wider and fainter shadow.
+# Bands of a shadow: lowest and highest part that throws it [m], blur of its edge [m], darkness.
+# Higher parts throw a wider and fainter shadow.
 _SHADOW_BANDS = ((-np.inf, 0.10, 0.03, 0.85), (0.0, 0.6, 0.08, 0.45), (0.0, np.inf, 0.16, 0.35))
 _SHADOW_PIXEL = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """A camera far away: parallel rays.
+    """A camera with parallel rays.
 
     Attributes:
         right: (3,) unit vector of the world that points right in the picture.
@@ -42,7 +42,7 @@ class Projection:
 
     @classmethod
     def looking(cls, yaw: float, elevation: float) -> Projection:
-        """A camera that looks in a compass direction, from above.
+        """A camera that looks in a direction and down.
 
         Args:
             yaw: Direction in which it looks [rad], counter-clockwise from +X.
@@ -56,14 +56,14 @@ class Projection:
         return cls(right, up, towards)
 
     def screen(self, points: npt.ArrayLike) -> FloatArray:
-        """Points (..., 3) of the world in the picture: right, up and towards the camera [m]."""
+        """Project points (..., 3) of the world: right, up and towards the camera [m]."""
         axes = np.stack([self.right, self.up, self.towards], axis=-1)
         return np.asarray(points, dtype=np.float64) @ axes
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """A picture with transparency whose edges lie on whole pixels.
+    """A picture with transparency, its edges on whole pixels.
 
     Attributes:
         rgba: (height, width, 4) colour already multiplied by alpha, and alpha, 0 to 1, top row
@@ -78,7 +78,7 @@ class Layer:
 
 
 class Canvas:
-    """A picture that layers are laid on, one over the other.
+    """A picture onto which layers are pasted, one over the other.
 
     Attributes:
         rgba: (height, width, 4) as in `Layer`.
@@ -87,12 +87,12 @@ class Canvas:
     """
 
     def __init__(self, left: int, top: int, width: int, height: int) -> None:
-        """An empty canvas; edges and size in pixels."""
+        """Make an empty canvas; edges and size in pixels."""
         self.rgba = np.zeros((height, width, 4), dtype=np.float32)
         self.left, self.top = left, top
 
-    def lay(self, layer: Layer, right: int = 0, up: int = 0, alpha: float = 1.0) -> None:
-        """Lay a layer over what is there, moved by whole pixels; what sticks out is cut off."""
+    def paste(self, layer: Layer, right: int = 0, up: int = 0, alpha: float = 1.0) -> None:
+        """Paste a layer over what is there, moved by whole pixels; what sticks out is cut off."""
         row, column = self.top - layer.top - up, layer.left + right - self.left
         height, width = self.rgba.shape[:2]
         rows = slice(max(row, 0), max(min(row + len(layer.rgba), height), 0))
@@ -109,7 +109,7 @@ class Canvas:
         here += over
 
     def picture(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 4) of 0 to 255, colours not multiplied by alpha, as files have them."""
+        """(height, width, 4), 0 to 255, colours not multiplied by alpha, as image files need it."""
         alpha = self.rgba[..., 3:]
         scale = np.where(alpha > 0, 255.0 / np.maximum(alpha, 1e-6), 0.0).astype(np.float32)
         out = np.empty(self.rgba.shape, dtype=np.uint8)
@@ -125,18 +125,17 @@ def draw(
     samples: int = 2,
     canvas: Canvas | None = None,
 ) -> Layer:
-    """Draw solids, the nearer before the farther, shaded, on nothing.
+    """Draw shaded solids on a transparent layer, nearer ones over farther ones.
 
     Args:
         meshes: At least one, in the world.
         view: The camera.
         pixel: Size of a pixel [m].
         samples: Rays across a pixel; more make smoother edges.
-        canvas: What it will be laid on, unmoved: nothing is drawn outside of it, however far the
-            solids reach.
+        canvas: The canvas it will be pasted onto, unmoved: nothing is drawn outside of it.
 
     Returns:
-        A layer just large enough.
+        The smallest layer that holds them.
     """
     scene = _Triangles.of(meshes, view)
     corner, (width, height) = _grid(scene.corners[..., :2], pixel)
@@ -148,7 +147,7 @@ def draw(
     low, step = corner * pixel, pixel / samples
     shape = (height * samples, width * samples)
     triangle, column, row = _cover(scene.corners[..., :2], low, step, shape)
-    # Coordinates from the corner of the picture: single precision is then ample, and twice as fast.
+    # Counted from the corner of the picture, single precision is enough, and twice as fast.
     x = ((column + 0.5) * step).astype(np.float32)
     y = ((row + 0.5) * step).astype(np.float32)
     planes = scene.planes(low).astype(np.float32)
@@ -168,7 +167,7 @@ def draw(
 
 
 def floor_shadow(meshes: Sequence[Mesh], yaw: float, elevation: float, pixel: float) -> Layer:
-    """The shadow that solids throw on the floor under an overcast sky, black.
+    """The soft black shadow that solids throw on the floor.
 
     Args:
         meshes: At least one, in the world.
@@ -238,10 +237,10 @@ class _Triangles:
         return cls(np.concatenate(corners), np.concatenate(normals), np.concatenate(colors))
 
     def planes(self, origin: FloatArray) -> FloatArray:
-        """(n, 3, 4) how depth and normal follow from (1, x, y) over each triangle.
+        """(n, 3, 4) coefficients of depth and normal in (1, x, y) over each triangle.
 
         Args:
-            origin: (2,) point of the picture from which x and y count.
+            origin: (2,) point of the picture where x and y are 0.
         """
         ones = np.ones((*self.corners.shape[:2], 1))
         base = np.concatenate([ones, self.corners[..., :2] - origin], axis=-1)
@@ -259,7 +258,7 @@ def _grid(points: FloatArray, pixel: float, margin: float = 0.0) -> tuple[FloatA
 def _cover(
     corners: FloatArray, low: FloatArray, step: float, shape: tuple[int, int]
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Which samples lie in which triangles.
+    """Find which samples are inside which triangles.
 
     Args:
         corners: (n, 3, 2) [m].
@@ -299,7 +298,7 @@ def _cover(
 def _ranges(
     first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """All whole numbers from first to last of each range: which range, and the number."""
+    """All whole numbers of each range from first to last: index of the range, and the number."""
     count = np.maximum(last - first + 1, 0)
     which = np.repeat(np.arange(len(first)), count)
     start = np.cumsum(count) - count
@@ -309,11 +308,11 @@ def _ranges(
 def _shade(
     colors: npt.NDArray[np.float32], normals: npt.NDArray[np.float32]
 ) -> npt.NDArray[np.float32]:
-    """Colours (n, 3) as lit, by normals (n, 3) in the picture's frame."""
+    """Lit colours (n, 3), from normals (n, 3) in the picture's frame."""
     lit = np.clip(normals @ _LIGHT.astype(np.float32), 0.0, 1.0)
     sky = 0.5 + 0.5 * normals[:, 1]
     away = 1.0 - np.clip(normals[:, 2], 0.0, 1.0)
-    # Surfaces that turn away from the eye darken: limbs stand out against each other.
+    # Surfaces that turn away from the camera are darker, so that limbs stand out.
     brightness = (0.42 + 0.22 * sky + 0.52 * lit) * (1.0 - 0.30 * away * away * away)
     gloss = lit * lit * lit
     shaded = colors * brightness[:, None] + 0.05 * (gloss * gloss * gloss)[:, None]

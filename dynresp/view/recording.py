@@ -13,7 +13,6 @@ import io
 import itertools
 import socket
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,7 @@ from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view import body_shapes as shapes
 from dynresp.view.body_shapes import PHASE_COLORS, Color, Mesh
-from dynresp.view.scene_solids import Cast
+from dynresp.view.scene_solids import SceneSolids
 from dynresp.view.story import PHASE_NAMES, MovingCapsule, MovingSphere, PhaseName, Story, row_at
 from dynresp.view.story_moments import camera_yaw
 
@@ -33,41 +32,30 @@ if TYPE_CHECKING:
 
 _HOST = "127.0.0.1"
 
-# Whatever the page holds, a browser loads nothing for it.
+# The browser may load nothing from elsewhere, whatever the page holds.
 _ALONE = (
     '<meta http-equiv="Content-Security-Policy" '
     "content=\"default-src data: blob: 'unsafe-inline' 'unsafe-eval'\">"
 )
 
-# So many events are named in the heading.
+# At most this many events are named in the heading.
 _MOST_EVENTS = 6
 
 # Lines on the ground are drawn this high above it [m], else the floor flickers through.
 _ABOVE_FLOOR = 0.004
 
 
-@dataclass(frozen=True)
-class RecordingConfig:
-    """How the recording is made.
-
-    Attributes:
-        max_fps: Frames beyond this rate are left out [1/s].
-        hold_s: How long the last pose stands before the player starts again [s].
-        dye: How much the clothes take the colour of the phase.
-        turn_deg: How far the camera stands ahead of the character's side.
-        elevation_deg: How far it looks down.
-        fov_deg: Its vertical field of view.
-    """
-
-    max_fps: float = 60.0
-    hold_s: float = 1.0
-    dye: float = 0.8
-    turn_deg: float = 32.0
-    elevation_deg: float = 13.0
-    fov_deg: float = 40.0
+# Frames beyond this rate are left out [1/s].
+_MAX_FPS = 60.0
+# How long the last pose stands before the player starts again [s].
+_HOLD_S = 1.0
+# How much the clothes take the colour of the phase.
+_DYE = 0.8
+# The camera: how far ahead of the character's side, how far it looks down, its field of view [rad].
+_TURN, _ELEVATION, _FIELD_OF_VIEW = np.radians(32.0), np.radians(13.0), np.radians(40.0)
 
 
-def write_recording(story: Story, path: Path | str, config: RecordingConfig | None = None) -> None:
+def write_recording(story: Story, path: Path | str) -> None:
     """Write a story as a self-contained HTML page; the file is whole or not there.
 
     While it is made, what other threads print to standard output is lost: the server announces
@@ -76,14 +64,12 @@ def write_recording(story: Story, path: Path | str, config: RecordingConfig | No
     Args:
         story: What is shown.
         path: The file; missing folders are made.
-        config: How it is made.
 
     Raises:
         DynrespError: The file cannot be written, or the machine allows no local server.
     """
-    config = config or RecordingConfig()
     with _server() as server:
-        scene = _Scene(server, story, config)
+        scene = _Scene(server, story)
         recorder = server.get_scene_serializer()
         scene.play(recorder)
         page = recorder.as_html()
@@ -116,17 +102,17 @@ def _server() -> Iterator[ViserServer]:
 
 
 class _Scene:
-    """The story in the server's scene, put from frame to frame."""
+    """The story in the server's scene, frame by frame."""
 
-    def __init__(self, server: ViserServer, story: Story, config: RecordingConfig) -> None:
-        self.story, self.config = story, config
-        self.cast = Cast(story)
+    def __init__(self, server: ViserServer, story: Story) -> None:
+        self.story = story
+        self.solids = SceneSolids(story)
         self.scene = server.scene
         self._set_stage(server)
         self._character = self._add_character("/character", shapes.phase_colors(
-            self.cast.solids, None, 0.0))  # fmt: skip
+            self.solids.solids, None, 0.0))  # fmt: skip
         self._others = [
-            self._add_character(f"/other_{i}", shapes.other_colors(self.cast.solids, i))
+            self._add_character(f"/other_{i}", shapes.other_colors(self.solids.solids, i))
             for i in range(len(story.others))
         ]
         self._things: list[tuple[MovingSphere | MovingCapsule, Any]] = []
@@ -136,7 +122,7 @@ class _Scene:
         for i, rod in enumerate(story.capsules):
             mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
             self._things.append((rod, self._add_mesh(f"/limb/{i}_{rod.name}", mesh)))
-        for i, mesh in enumerate((*self.cast.blocks(), *self.cast.edge())):
+        for i, mesh in enumerate((*self.solids.blocks(), *self.solids.edge())):
             self._add_mesh(f"/block/{i}", mesh)
         colors = itertools.cycle(shapes.PATH_COLORS)
         for i, (path, color) in enumerate(zip(story.paths, colors, strict=False)):
@@ -151,25 +137,25 @@ class _Scene:
         self._label = self.scene.add_label(
             "/phase", " ", anchor="bottom-center", font_size_mode="screen", font_screen_scale=1.1
         )
-        # Without words it would be an empty box above the head.
+        # Without text it would be an empty box above the head.
         self._label.visible = False
         self._phase: PhaseName | None = None
 
     def play(self, recorder: Any) -> None:
-        """Put the scene from frame to frame, with the time between them."""
+        """Show one frame after the other, with the time between them."""
         fps = self.story.motion.fps
-        step = max(1, int(np.ceil(fps / self.config.max_fps)))
+        step = max(1, int(np.ceil(fps / _MAX_FPS)))
         frames = list(range(0, len(self.story.motion), step))
         for number, frame in enumerate(frames):
             if number:
                 recorder.insert_sleep((frame - frames[number - 1]) / fps)
             self._put(frame)
-        recorder.insert_sleep(self.config.hold_s)
+        recorder.insert_sleep(_HOLD_S)
 
     def _put(self, frame: int) -> None:
         self._dress(self.story.phase_at(frame / self.story.motion.fps))
-        _put_bodies(self._character, self.cast.states, frame)
-        for bodies, states in zip(self._others, self.cast.others, strict=True):
+        _put_bodies(self._character, self.solids.states, frame)
+        for bodies, states in zip(self._others, self.solids.others, strict=True):
             _put_bodies(bodies, states, min(frame, len(states.positions) - 1))
         for thing, handle in self._things:
             at = row_at(thing.positions, frame)
@@ -178,24 +164,24 @@ class _Scene:
                 handle.position = at
                 if isinstance(thing, MovingCapsule):
                     handle.wxyz = thing.quaternions[frame]
-        head = self.cast.states.centers[frame, self.cast.head]
+        head = self.solids.states.centers[frame, self.solids.head]
         self._label.position = head + np.array([0.0, 0.0, 0.24])
 
     def _dress(self, phase: PhaseName | None) -> None:
-        """Colours and words of a phase, where it begins."""
+        """Set the colours and the label when a phase begins."""
         if phase == self._phase:
             return
         self._phase = phase
         self._label.text = phase or " "
         self._label.visible = phase is not None
-        colors = shapes.phase_colors(self.cast.solids, phase, self.config.dye)
+        colors = shapes.phase_colors(self.solids.solids, phase, _DYE)
         for (_, handle), color in zip(self._character, colors, strict=True):
             handle.color = _bytes(color)
 
     def _add_character(self, name: str, colors: list[Color]) -> list[tuple[int, Any]]:
         return [
             (solid.body, self._add_mesh(f"{name}/{solid.name}", solid.mesh, color))
-            for solid, color in zip(self.cast.solids, colors, strict=True)
+            for solid, color in zip(self.solids.solids, colors, strict=True)
         ]
 
     def _add_mesh(self, name: str, mesh: Mesh, color: Color | None = None) -> Any:
@@ -207,8 +193,8 @@ class _Scene:
         )
 
     def _set_stage(self, server: ViserServer) -> None:
-        """Floor, light and the camera, which sees the whole way."""
-        low, high = self.cast.bounds()
+        """Set floor, light and the camera, which sees the whole path."""
+        low, high = self.solids.bounds()
         middle = 0.5 * (low + high)
         middle[2] = 0.85
         size = float(np.ceil(np.linalg.norm((high - low)[:2]) + 8.0))
@@ -220,36 +206,36 @@ class _Scene:
             section_color=(190, 197, 204), shadow_opacity=0.3, plane_color=(243, 245, 247),
             plane_opacity=1.0,
         )  # fmt: skip
-        yaw = camera_yaw(self.story, float(np.radians(self.config.turn_deg)))
+        yaw = camera_yaw(self.story, float(_TURN))
         right = np.array([np.sin(yaw), -np.cos(yaw)])
         points = np.concatenate(
-            [s.positions.reshape(-1, 3) for s in (self.cast.states, *self.cast.others)]
+            [s.positions.reshape(-1, 3) for s in (self.solids.states, *self.solids.others)]
         )
         across = (points[:, :2] - middle[:2]) @ right
         half = float(np.abs(across).max()) + 0.9
-        # Wide enough for the way in a window of 4:3, high enough for a person with a raised arm.
-        tangent = np.tan(0.5 * np.radians(self.config.fov_deg))
+        # Wide enough for the path in a window of 4:3, high enough for a person with a raised arm.
+        tangent = np.tan(0.5 * _FIELD_OF_VIEW)
         distance = max(half / (4 / 3 * tangent), 1.5 / tangent)
-        down = np.radians(self.config.elevation_deg)
+        down = _ELEVATION
         back = np.array([-np.cos(yaw), -np.sin(yaw)]) * np.cos(down) * distance
         camera = server.initial_camera
-        camera.fov = float(np.radians(self.config.fov_deg))
+        camera.fov = float(_FIELD_OF_VIEW)
         camera.look_at = middle
         camera.position = middle + np.array([*back, np.sin(down) * distance])
 
 
 def _with_heading(page: str, story: Story) -> str:
-    """The page with its title, what happens when, and a ban on anything from elsewhere."""
+    """The page with a title, a list of events, and a ban on loading anything from elsewhere."""
     shown = [name for name in PHASE_NAMES if any(phase.name == name for phase in story.phases)]
     chips = "".join(
         f'<span style="margin-left:1.1em"><span style="color:rgb{_bytes(PHASE_COLORS[name])}">'
         f"&#9679;</span> {name}</span>"
         for name in shown
     )
-    told = sorted(story.events, key=lambda event: event.time_s)
-    more = len(told) - _MOST_EVENTS
+    events_shown = sorted(story.events, key=lambda event: event.time_s)
+    more = len(events_shown) - _MOST_EVENTS
     events = " &middot; ".join(
-        f"{event.time_s:.2f} s {html.escape(event.name)}" for event in told[:_MOST_EVENTS]
+        f"{event.time_s:.2f} s {html.escape(event.name)}" for event in events_shown[:_MOST_EVENTS]
     ) + (f" and {more} more" if more > 0 else "")
     lines = [
         f'<div style="font-size:17px;font-weight:600">{html.escape(story.title)}</div>',

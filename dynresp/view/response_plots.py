@@ -1,4 +1,4 @@
-"""Plots of what was decided: the error surface of an alignment, and how the reactions compare.
+"""Plots of the alignment: the mismatch over all exits and entries, and of all reactions.
 
 Figures are made as objects and drawn by matplotlib's Agg; its global state is never touched.
 """
@@ -28,17 +28,17 @@ _CHOSEN = "#d6402b"
 _INK = "#23272e"
 _BAR, _OTHER_BAR = "#379c78", "#b9c2cb"
 _DPI = 150
-# Bars beyond this number are left out; the chosen one is always among those shown.
+# At most this many bars; the chosen reaction is always shown.
 _MOST_BARS = 24
 
 
 @dataclass(frozen=True)
 class RankedReaction:
-    """How well one reaction fits.
+    """The mismatch of one reaction.
 
     Attributes:
         name: Of the reaction.
-        error: Its best window error.
+        error: Its least mismatch (window error).
     """
 
     name: str
@@ -58,22 +58,22 @@ def write_alignment(
     ranking: Sequence[RankedReaction] = (),
     chosen_name: str = "",
 ) -> None:
-    """Write the window error over all exits and entries of one reaction, as a PNG.
+    """Write the mismatch (window error) over all exits and entries of one reaction, as a PNG.
 
     A map with contour lines and, beside it, the same as a surface in space (Zordan et al. 2007,
-    colour plate); the chosen pair is marked in both. With a ranking, a third panel shows how the
-    reactions compare. Errors that are not finite, where a pair is not allowed, stay blank.
+    colour plate); the chosen pair is marked in both. With a ranking, a third panel compares the
+    reactions. Pairs that are not allowed have errors that are not finite; they stay blank.
 
     Args:
         path: The file; missing folders are made.
         surface: (exits, entries) window errors, at least one of them finite.
-        exit_times_s: (exits,) when the simulation would be left [s], rising.
-        entry_times_s: (entries,) when the reaction would be entered, in its own clip [s], rising.
+        exit_times_s: (exits,) time of each exit from physics [s], rising.
+        entry_times_s: (entries,) time of each entry, in the reaction's clip [s], rising.
         chosen_exit_s: Exit of the chosen pair [s].
         chosen_entry_s: Entry of the chosen pair [s].
         title: First line.
-        unit: Unit of the error; none where it is empty.
-        ranking: The best error of each reaction, in any order.
+        unit: Unit of the error, or empty.
+        ranking: The least error of each reaction, in any order.
         chosen_name: Name in the ranking of the reaction that was chosen.
 
     Raises:
@@ -95,7 +95,7 @@ def write_alignment(
             raise MotionError(f"{what} times must be finite and rise")
     errors = np.where(np.isfinite(errors), errors, np.nan)
     chosen = (chosen_exit_s, chosen_entry_s)
-    label = "window error" + (f" [{unit}]" if unit else "")
+    label = "mismatch (window error)" + (f" [{unit}]" if unit else "")
     figure = _figure(13.2 if ranking else 9.6, 4.4)
     columns = (1.15, 1.0, 0.85) if ranking else (1.15, 1.0)
     grid = figure.add_gridspec(1, len(columns), width_ratios=columns)
@@ -109,7 +109,7 @@ def write_alignment(
 
 
 def _heading(figure: Figure, title: str) -> None:
-    # A dollar sign in a title is one: nothing here is mathematics.
+    # Dollar signs in a title are no mathematics.
     figure.suptitle(title, x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK,
                     parse_math=False)  # fmt: skip
 
@@ -130,13 +130,13 @@ def _map(
     chosen: tuple[float, float],
     label: str,
 ) -> None:
-    """Errors as colours, with contour lines where the surface has two dimensions."""
+    """Draw errors as colours, with contour lines if the surface has two dimensions."""
     image = axes.pcolormesh(
         _edges(entries), _edges(exits), np.ma.masked_invalid(errors), cmap=_COLORS
     )
     low, high = np.nanmin(errors), np.nanmax(errors)
     if min(errors.shape) > 1 and high > low:
-        # As many cells between two lines everywhere: the valley is drawn finer than the slopes.
+        # Lines at even shares of the cells: more in the valley than on the slopes.
         levels = np.unique(np.nanquantile(errors, np.linspace(0.02, 0.9, 9)))
         axes.contour(
             entries, exits, np.ma.masked_invalid(errors), levels=levels, colors="white",
@@ -171,7 +171,7 @@ def _space(
     entries: FloatArray,
     chosen: tuple[float, float],
 ) -> None:
-    """The same as a surface in space, seen so that its valley is open to the eye."""
+    """Draw the same as a surface in space, seen so that the valley is visible."""
     axes: Any = figure.add_subplot(cell, projection="3d")
     if min(errors.shape) > 1:
         x, y = np.meshgrid(entries, exits)
@@ -200,7 +200,7 @@ def _space(
 
 
 def _bars(axes: Axes, ranking: Sequence[RankedReaction], chosen_name: str, label: str) -> None:
-    """One bar a reaction, the best on top, the chosen one in colour."""
+    """Draw one bar for each reaction, the best at the top, the chosen one in colour."""
     ranked = sorted((r for r in ranking if np.isfinite(r.error)), key=lambda r: r.error)
     if not ranked:
         raise MotionError("no reaction with a finite error; there is nothing to show")
@@ -234,7 +234,7 @@ def _short(name: str) -> str:
 
 
 def _edges(times: FloatArray) -> FloatArray:
-    """Borders of cells around times, half way between neighbours."""
+    """Borders of the cells around times, half way between neighbours."""
     if len(times) == 1:
         return np.asarray(times[0] + np.array([-0.5, 0.5]) / 30.0)
     middle = 0.5 * (times[1:] + times[:-1])

@@ -1,4 +1,4 @@
-"""All that is to be seen at one moment of a story, as solids in the world."""
+"""All solids of a story at one moment, in the world: characters, balls, blocks, lines."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from dynresp.view.body_shapes import Mesh
 from dynresp.view.story import MovingCapsule, PhaseName, Story, row_at
 
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-# What reaches higher than this is a wall, of which only the lowest part is shown [m]: it would hide
-# the person beside it.
+# A block higher than this is a wall [m]. Only its lowest part is shown: it would hide the person
+# beside it.
 _WALL, _WALL_SHOWN = 1.2, 0.35
-# By how much less a block is drawn than the one before it in the list [m], so many times.
+# Each block is drawn this much smaller than the one before it in the list [m]; this many sizes.
 _LESS, _SIZES = 0.0004, 16
 # Width and height of lines on the ground, and of the edge of the world [m].
 _LINE, _EDGE = (0.035, 0.004), (0.06, 0.05)
 
 
-class Cast:
+class SceneSolids:
     """The characters and things of a story.
 
     Attributes:
-        story: Whose they are.
-        solids: What a character is made of.
+        story: The story.
+        solids: The solids that make up a character.
         states: Bodies of the main character, frame by frame.
         others: Bodies of the further characters, each as many frames as it has.
         head: Index of the head among the bodies.
     """
 
     def __init__(self, story: Story) -> None:
-        """Compute where all bodies are.
+        """Compute the kinematics of all characters.
 
         Args:
             story: What is shown.
@@ -46,23 +46,23 @@ class Cast:
         self.solids = shapes.character_solids(character)
         self.states = character.kinematics(story.motion.poses)
         self.others = tuple(character.kinematics(other.poses) for other in story.others)
-        still = [_stands_still(rod, len(story.motion)) for rod in story.capsules]
-        self._bars = [rod for rod, stands in zip(story.capsules, still, strict=True) if stands]
-        self._limbs = [rod for rod, stands in zip(story.capsules, still, strict=True) if not stands]
+        static = [_is_static(rod, len(story.motion)) for rod in story.capsules]
+        self._bars = [rod for rod, fixed in zip(story.capsules, static, strict=True) if fixed]
+        self._limbs = [rod for rod, fixed in zip(story.capsules, static, strict=True) if not fixed]
 
     def meshes(
         self, frame: int, phase: PhaseName | None, dye: float, within: float = np.inf
     ) -> list[Mesh]:
-        """All solids at a frame, in the world, but for what `standing` tells of.
+        """All solids at a frame, in the world, without those that `static` returns.
 
-        Bars that stand still are among them only where they are near.
+        Bars that do not move are included only if they are near.
 
         Args:
             frame: Frame of the story.
-            phase: In whose colour the main character's clothes are dyed.
-            dye: How much, 0 to 1.
-            within: Things further than this from the main character's pelvis, along the ground,
-                are left out; further characters count from twice as far [m].
+            phase: The phase whose colour the main character's clothes take.
+            dye: How much of that colour, 0 to 1.
+            within: Things farther than this from the main character's pelvis, along the ground,
+                are left out [m]; for other characters the distance is twice this.
         """
         colors = shapes.phase_colors(self.solids, phase, dye)
         meshes = shapes.place(self.solids, self.states, frame, colors)
@@ -83,12 +83,12 @@ class Cast:
                 meshes.append(mesh.placed(at, rod.quaternions[frame]))
         return meshes
 
-    def standing(self) -> list[Mesh]:
-        """All that stands still the whole time: blocks, bars, lines on the ground, its edge."""
+    def static(self) -> list[Mesh]:
+        """All that never moves: blocks, bars, lines on the ground, the edge of the world."""
         return [*self.blocks(), *self.bars(), *self.lines(), *self.edge()]
 
     def bars(self) -> list[Mesh]:
-        """The capsules that stand still, in the world."""
+        """The capsules that never move, in the world."""
         return [
             shapes.capsule(bar.radius, bar.half_length, shapes.CAPSULE_COLOR).placed(
                 bar.positions[0], bar.quaternions[0]
@@ -97,7 +97,7 @@ class Cast:
         ]
 
     def lines(self) -> list[Mesh]:
-        """What is drawn on the ground, in the world."""
+        """The lines on the ground, in the world."""
         return [
             shapes.ribbon(path.points, *_LINE, color)
             for path, color in zip(
@@ -106,7 +106,7 @@ class Cast:
         ]
 
     def edge(self) -> list[Mesh]:
-        """A low kerb along the bounds of the world, where it has any."""
+        """A low kerb along the bounds of the world, if it has bounds."""
         outline = self.story.outline
         return [] if outline is None else [shapes.ribbon(outline, *_EDGE, shapes.BOUNDS_COLOR)]
 
@@ -115,7 +115,7 @@ class Cast:
         return [self._block(number) for number in range(len(self.story.blocks))]
 
     def underfoot(self, frame: int, within: float) -> list[Mesh]:
-        """Blocks, no walls, whose middle is this near to the main character at a frame [m]."""
+        """Blocks (not walls) whose centre is within a distance [m] of the main character."""
         return [
             self._block(number)
             for number, block in enumerate(self.story.blocks)
@@ -124,7 +124,7 @@ class Cast:
 
     def _block(self, number: int) -> Mesh:
         block = self.story.blocks[number]
-        # Where two walls meet, faces that lie in one plane would flicker and be lit twice.
+        # Faces of two walls in one plane would flicker and be lit twice.
         less = _LESS * (number % _SIZES)
         top = (block.top if block.top <= _WALL else _WALL_SHOWN) - less
         bottom = min(block.center[2] - block.half_sizes[2], top - 0.01)
@@ -137,21 +137,21 @@ class Cast:
         """From the main character's pelvis to a point (3,), along the ground [m]."""
         return float(np.linalg.norm((point - self.states.positions[frame, 0])[:2]))
 
-    def foot_print(self, frame: int) -> FloatArray:
-        """(3,) the point of the floor below the main character's centre of mass."""
+    def ground_point(self, frame: int) -> FloatArray:
+        """(3,) the point on the floor below the main character's centre of mass [m]."""
         masses = default_character().masses
         middle = masses @ self.states.centers[frame] / masses.sum()
         return np.array([middle[0], middle[1], 0.0])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corner (3,) of the box that all characters stay in [m]."""
+        """Lowest and highest corner (3,) of the box around all characters at all times [m]."""
         points = np.concatenate(
             [states.positions.reshape(-1, 3) for states in (self.states, *self.others)]
         )
         return points.min(axis=0), points.max(axis=0)
 
 
-def _stands_still(rod: MovingCapsule, frames: int) -> bool:
-    """Whether a capsule is in one place through all of a story's frames."""
-    ways = np.concatenate([rod.positions, rod.quaternions], axis=1)
-    return len(ways) >= frames > 1 and bool((ways == ways[0]).all())
+def _is_static(rod: MovingCapsule, frames: int) -> bool:
+    """Whether a capsule keeps its pose through all frames of a story."""
+    rows = np.concatenate([rod.positions, rod.quaternions], axis=1)
+    return len(rows) >= frames > 1 and bool((rows == rows[0]).all())

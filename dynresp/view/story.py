@@ -1,7 +1,7 @@
-"""What is shown: one character's motion, what flies about it, and what happens when.
+"""A story: everything that recording, filmstrip, video and plan show.
 
-A story is all that the recording, the filmstrip and the video need to know. World: metres, Z up.
-Everything in a story runs on the clock of its main motion: row k is at time k / fps.
+It holds the main character's motion, other characters, balls, blocks, events and phases. World:
+metres, Z up. All parts use the clock of the main motion: row k is at time k / fps.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ PHASE_NAMES: tuple[PhaseName, ...] = get_args(PhaseName)
 
 @dataclass(frozen=True, eq=False)
 class MovingSphere:
-    """A ball on its way. Arrays are read-only.
+    """A moving ball. Arrays are read-only.
 
     Attributes:
         name: What it is, for people, such as "ball".
@@ -49,7 +49,7 @@ class MovingSphere:
 
 @dataclass(frozen=True, eq=False)
 class MovingCapsule:
-    """A limb or a stick on its way. Arrays are read-only.
+    """A moving limb or stick. Arrays are read-only.
 
     Attributes:
         name: What it is, for people, such as "fist".
@@ -90,12 +90,12 @@ class MovingCapsule:
 
 @dataclass(frozen=True)
 class Block:
-    """A box that stands still: a wall, a stool, a block of rough ground.
+    """A box that does not move: a wall, a stool, a block of rough ground.
 
     Attributes:
         center: Its middle [m], world.
         half_sizes: Half its length along its own x, y and z [m].
-        yaw: By how much it is turned about the vertical [rad].
+        yaw: Its turn about the vertical [rad].
 
     Raises:
         MotionError: A number is not finite, or a size is not positive.
@@ -120,7 +120,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class GroundPath:
-    """A line drawn on the ground, such as a sketched way. The array is read-only.
+    """A line drawn on the ground, such as a sketched path. The array is read-only.
 
     Attributes:
         name: What it is, for people, such as "sketch".
@@ -156,7 +156,7 @@ class StoryEvent:
 
 @dataclass(frozen=True)
 class StoryPhase:
-    """A stretch of the story in which one thing drives the character.
+    """A part of the story in which one thing drives the character.
 
     Attributes:
         name: "base motion", "physics", "blend" or "reaction".
@@ -191,17 +191,17 @@ class Story:
         motion: The main character.
         spheres: Balls.
         capsules: Limbs or sticks.
-        others: Further characters, at the frame rate of `motion`; each holds its last pose.
-        blocks: What stands about.
-        paths: What is drawn on the ground.
-        bounds: How far one can go, (x, y, x, y) of two corners [m]; None where there is no bound.
+        others: Other characters, at the frame rate of `motion`; each holds its last pose.
+        blocks: Boxes that do not move.
+        paths: Lines on the ground.
+        bounds: Of the world, (x, y, x, y) of two corners [m]; None without bounds.
         events: Moments with names.
-        phases: What drives the main character when; where they overlap, the later one counts.
+        phases: What drives the main character, and when; where two overlap, the later one counts.
         title: First line, for people.
         subtitle: Second line.
 
     Raises:
-        MotionError: A further character has another frame rate; an event lies outside.
+        MotionError: Another character has another frame rate; an event is outside the story.
     """
 
     motion: Motion
@@ -228,12 +228,12 @@ class Story:
                     f"character {other.name!r} runs at {other.fps:g} fps, the story at "
                     f"{self.motion.fps:g}; use its resampled({self.motion.fps:g})"
                 )
-        # Half a frame of grace: events are found in simulations that end between two frames.
+        # Half a frame of tolerance: events come from simulations that end between two frames.
         last = self.motion.duration + 0.5 / self.motion.fps
         for event in self.events:
             if not -0.5 / self.motion.fps <= event.time_s <= last:
                 raise MotionError(
-                    f"event {event.name!r} at {event.time_s} s lies outside the story, "
+                    f"event {event.name!r} at {event.time_s} s is outside the story, "
                     f"which runs from 0 to {self.motion.duration:g} s"
                 )
         times = np.arange(len(self.motion)) / self.motion.fps
@@ -258,7 +258,7 @@ class Story:
         for phase in reversed(self.phases):
             if phase.start_s <= time_s < phase.stop_s:
                 return phase.name
-        # The very end belongs to the phase that runs up to it.
+        # The end of the story belongs to the phase before it.
         for phase in reversed(self.phases):
             if math.isclose(time_s, phase.stop_s, abs_tol=0.5 / self.motion.fps):
                 return phase.name

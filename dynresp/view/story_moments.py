@@ -1,4 +1,4 @@
-"""Which moments of a story a picture shows, and from where one looks at it."""
+"""Which moments of a story a picture shows, and where the camera stands."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ class Moment:
 
 
 def choose_moments(story: Story, count: int = 8) -> list[Moment]:
-    """Before the first event, at every event, at the end, and between the last two, evenly.
+    """Choose a moment before the first event, every event, and even steps from the last to the end.
 
-    Events that fall together become one moment with several names. Without events the moments
-    are spread evenly.
+    Events at the same time become one moment with several names. Without events the moments are
+    evenly spaced.
 
     Args:
         story: What is shown.
-        count: How many moments are wanted; more events than that are all kept.
+        count: How many moments; if there are more events, all are kept.
     """
     events = sorted(story.events, key=lambda event: event.time_s)
     if not events:
@@ -63,7 +63,7 @@ def _merged(story: Story, marks: list[StoryEvent]) -> list[Moment]:
         time = min(max(mark.time_s, 0.0), story.duration)
         if moments and time - moments[-1].time_s < _MERGE_S:
             old = moments[-1]
-            # An event keeps its own time; a moment without a name gives way to it.
+            # An event keeps its own time; a moment without a name is dropped.
             if old.events or not names:
                 moments[-1] = Moment(old.time_s, old.frame, old.events + names, old.phase)
                 continue
@@ -73,9 +73,9 @@ def _merged(story: Story, marks: list[StoryEvent]) -> list[Moment]:
 
 
 def main_direction(story: Story) -> FloatArray:
-    """Where the main character goes on the whole, as a unit vector (2,) on the ground.
+    """The direction in which the main character travels, a unit vector (2,) on the ground.
 
-    Where it ends closer than half a metre to where it began: where it faces at first.
+    If it ends less than half a metre from its start, the direction in which it faces at first.
     """
     path = story.motion.root_positions[:, :2]
     travel = path[-1] - path[0]
@@ -87,12 +87,11 @@ def main_direction(story: Story) -> FloatArray:
 
 
 def camera_yaw(story: Story, turn: float) -> float:
-    """Compass direction [rad] in which a camera looks that sees the character go to the right.
+    """Yaw [rad] of a camera that sees the character go to the right.
 
     Args:
         story: What is shown.
-        turn: How far the camera stands ahead of the character's side [rad]; 0 is a side view, and
-            a little more shows the front, too.
+        turn: How far the camera stands ahead of the character's side [rad]; 0 is a side view.
     """
     direction = main_direction(story)
     return float(np.arctan2(direction[1], direction[0])) + 0.5 * np.pi + turn

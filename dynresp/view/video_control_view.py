@@ -1,8 +1,8 @@
 """The picture of an avatar that follows somebody in a video.
 
-Above, moments of the video with the person's silhouette outlined, and below each the avatar at that
-moment; then, over time, what the person was seen to do, what was chosen for the avatar, and what it
-did; at the bottom an example of each action.
+The first rows show moments of the video, with the outline of the person, and the avatar at the same
+moments. The time line shows what the person did as it was recognised, which action was chosen for
+the avatar, and what the avatar did. The last rows show an example of each action.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ _LEFT, _RIGHT, _GAP = 0.85, 0.25, 0.12
 _HEADING, _NAMES, _AVATARS, _LINE, _AXIS = 0.75, 0.28, 1.75, 0.85, 0.55
 # An example of an action with its words: height, and least width [inch].
 _EXAMPLES, _WORDS, _EXAMPLE_WIDTH = 1.35, 0.5, 1.5
-# The least share of width and height of the pictures that is shown.
+# At least this share of the width and height of the pictures is shown.
 _LEAST_PART = 0.35
-# What a figure shows of the world, across [m]; they stand on one line.
+# Height of the part of the world that a figure shows [m].
 _TALL = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class VideoMoment:
     """A moment of the video.
 
     Attributes:
-        time_s: When.
+        time_s: Time in the video [s].
         picture: (h, w, 3) blue green red.
         mask: (h, w) 255 where the person is.
     """
@@ -65,12 +65,12 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class TimeLine:
+class ActionTimeline:
     """Actions over time, by their numbers; None where there is none.
 
     Attributes:
         times_s: (k,) end of each step [s].
-        person: (k,) what the person was seen to do.
+        person: (k,) what the person did, as recognised.
         chosen: (k,) what was chosen for the avatar.
         avatar: (k,) what it did.
     """
@@ -82,34 +82,36 @@ class TimeLine:
 
 
 @dataclass(frozen=True, eq=False)
-class Watched:
-    """What is shown.
+class VideoControlStory:
+    """What the picture shows.
 
     Attributes:
-        motion: The avatar's, in the video's time.
-        moments: Of the video; some of them are shown.
+        motion: Of the avatar, in the video's time.
+        moments: Of the video; seven of them are shown.
         line: Actions over time.
         poses: (K, 59) an example of each action.
-        words: (K,) what each is.
+        words: (K,) what each action is.
     """
 
     motion: Motion
-    moments: Sequence[Seen]
-    line: TimeLine
+    moments: Sequence[VideoMoment]
+    line: ActionTimeline
     poses: FloatArray
     words: Sequence[str]
 
 
 def letter(number: int) -> str:
-    """What an action is called: A, B, C and so on."""
+    """Name of an action: A, B, C and so on."""
     return chr(ord("A") + number)
 
 
-def write_watched(watched: Watched, path: Path | str, title: str, subtitle: str) -> None:
+def write_video_control(
+    watched: VideoControlStory, path: Path | str, title: str, subtitle: str
+) -> None:
     """Write the picture as a PNG; the file is whole or not there.
 
     Args:
-        watched: What is shown.
+        watched: What the picture shows.
         path: The file; missing folders are made.
         title: First line.
         subtitle: Second line.
@@ -123,11 +125,11 @@ def write_watched(watched: Watched, path: Path | str, title: str, subtitle: str)
 
 
 class _Sheet:
-    """One picture in the making. Lengths are inches, from the upper left corner."""
+    """One picture while it is drawn. Lengths are inches, from the upper left corner."""
 
-    def __init__(self, watched: Watched) -> None:
+    def __init__(self, watched: VideoControlStory) -> None:
         self.watched = watched
-        self.moments = _spread(watched.moments, _MOMENTS)
+        self.moments = _evenly(watched.moments, _MOMENTS)
         self.part = _part(self.moments)
         height, width = (int(cut.stop - cut.start) for cut in self.part)
         # Pictures of a telephone held upright are high; they keep their shape within bounds.
@@ -186,8 +188,8 @@ class _Sheet:
         figure.text((_LEFT - 0.12) / self.width, 1.0 - down / self.height, text, ha="right",
                     va="center", fontsize=9, color=_FAINT_INK)  # fmt: skip
 
-    def _moment(self, figure: Figure, number: int, moment: Seen) -> None:
-        """A picture, and the avatar below it."""
+    def _moment(self, figure: Figure, number: int, moment: VideoMoment) -> None:
+        """Draw a picture of the video, and the avatar below it."""
         left = _LEFT + number * (_COLUMN + _GAP)
         top = _HEADING + _NAMES
         at = self._step(moment.time_s)
@@ -195,7 +197,7 @@ class _Sheet:
         axes = self._axes(figure, left, top, _COLUMN, self.pictures)
         axes.imshow(moment.picture[self.part][..., ::-1], interpolation="bilinear")
         mask = moment.mask[self.part] > 127
-        # Where somebody fills all that is shown, there is no outline.
+        # A person who fills the whole part has no outline.
         if mask.any() and not mask.all():
             for color, wide in (((1.0, 1.0, 1.0), 2.4), (_color(line.person[at]), 1.4)):
                 axes.contour(mask, levels=[0.5], colors=[color], linewidths=wide)
@@ -207,7 +209,7 @@ class _Sheet:
                 _badge(cell, what)
 
     def _step(self, time_s: float) -> int:
-        """The step of the time line in which a moment lies."""
+        """The step of the time line at a time."""
         times = np.asarray(self.watched.line.times_s)
         return min(int(np.searchsorted(times, time_s - 1e-6)), len(times) - 1)
 
@@ -246,7 +248,7 @@ class _Sheet:
             side.set_visible(False)
 
     def _example(self, figure: Figure, number: int, pose: FloatArray) -> None:
-        """A pose that stands for an action, with its letter and its words."""
+        """Draw a pose that stands for an action, with its letter and its words."""
         row, column = divmod(number, self.in_row)
         step = (self.width - _LEFT - _RIGHT + _GAP) / self.in_row
         wide = min(step - _GAP, 2.2)
@@ -271,7 +273,7 @@ def _badge(axes: Axes, number: int) -> None:
 
 
 def _stand(axes: Axes, pose: FloatArray, width: float) -> None:
-    """Draw somebody in a pose, all to one scale, in the middle and on a line."""
+    """Draw a person in a pose, to one scale, in the middle and on a line."""
     picture = pose_picture(pose)
     high, wide = picture.shape[:2]
     axes.imshow(picture, interpolation="bilinear")
@@ -281,8 +283,8 @@ def _stand(axes: Axes, pose: FloatArray, width: float) -> None:
     axes.axhline(high, color=mix(_FAINT_INK, (1, 1, 1), 0.5), lw=0.8, zorder=0)
 
 
-def _part(moments: Sequence[Seen]) -> tuple[slice, slice]:
-    """Rows and columns of the pictures in which the person is, with some room, in one shape."""
+def _part(moments: Sequence[VideoMoment]) -> tuple[slice, slice]:
+    """Rows and columns of the pictures that hold the person with a margin, in the same shape."""
     if not moments:
         return slice(0, 3), slice(0, 4)
     mask = np.max([moment.mask for moment in moments], axis=0) > 127
@@ -300,8 +302,8 @@ def _part(moments: Sequence[Seen]) -> tuple[slice, slice]:
     return parts[0], parts[1]
 
 
-def _spread(moments: Sequence[Seen], count: int) -> list[Seen]:
-    """Some of the moments, evenly."""
+def _evenly(moments: Sequence[VideoMoment], count: int) -> list[VideoMoment]:
+    """Up to `count` of the moments, evenly spaced."""
     if len(moments) <= count:
         return list(moments)
     return [moments[int(k)] for k in np.linspace(0, len(moments) - 1, count).round()]
@@ -310,7 +312,7 @@ def _spread(moments: Sequence[Seen], count: int) -> list[Seen]:
 def _runs(
     begins: FloatArray, ends: FloatArray, numbers: Sequence[int | None]
 ) -> list[tuple[float, float, int | None]]:
-    """Steps of one action after the other as one, with begin and end."""
+    """Consecutive steps of one action joined: begin, end and action of each."""
     out: list[tuple[float, float, int | None]] = []
     for begin, end, number in zip(begins.tolist(), ends.tolist(), numbers, strict=True):
         if out and out[-1][2] == number:

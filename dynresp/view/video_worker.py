@@ -57,7 +57,7 @@ def main(script_file: str, video_file: str) -> None:
     ground = model.geom("floor").id
     solids = np.flatnonzero(np.arange(model.ngeom) != ground)
     with mujoco.Renderer(model, height, width) as renderer:
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = bool(script["shadows"])
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = True
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         film = imageio_ffmpeg.write_frames(
             video_file,
@@ -106,7 +106,7 @@ def _model(mujoco: Any, script: Mapping[str, npt.NDArray[Any]], width: int, heig
         light.cutoff, light.exponent = _LIT_DEG, 0.0
         light.dir = aim
         light.pos = -_LAMP_DISTANCE * aim
-        light.castshadow = bool(script["shadows"])
+        light.castshadow = True
     spec.visual.map.shadowscale = _SHADOWED_DEG / _LIT_DEG
     spec.stat.extent = _EXTENT
     vertices = np.split(script["vertices"], np.cumsum(script["vertex_counts"])[:-1])

@@ -16,7 +16,6 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,7 @@ from dynresp.support.extras import require
 from dynresp.support.files import replacing
 from dynresp.view import body_shapes as shapes
 from dynresp.view.body_shapes import Color, Mesh
-from dynresp.view.scene_solids import Cast
+from dynresp.view.scene_solids import SceneSolids
 from dynresp.view.story import Story
 from dynresp.view.story_moments import camera_yaw
 from dynresp.view.video_worker import PROGRESS
@@ -37,36 +36,22 @@ GL_VARIABLE = "MUJOCO_GL"
 ASKED_VARIABLE = "DYNRESP_GL"
 """Environment variable by which a user tells MuJoCo how to draw; it is tried first."""
 
-# A worker that says nothing for so long [s] hangs in a graphics driver.
+# A worker that prints nothing for this long [s] hangs in a graphics driver.
 _STALL_S = 60.0
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
+# How much the clothes take the colour of the phase.
+_DYE = 0.8
+# The camera: how far ahead of the character's side [rad], how far it looks down [degrees], its
+# distance from the character [m], and the time over which its path is smoothed [s].
+_TURN, _ELEVATION_DEG, _DISTANCE, _SMOOTHING_S = np.radians(35.0), 14.0, 3.6, 0.35
+# Constant rate factor of H.264: less is better and larger.
+_QUALITY = 20
+
+
 class RenderingUnavailableError(DynrespError):
     """This machine cannot draw; the message says what was tried and what to install."""
-
-
-@dataclass(frozen=True)
-class VideoConfig:
-    """How the video is drawn.
-
-    Attributes:
-        dye: How much the clothes take the colour of the phase.
-        turn_deg: How far the camera stands ahead of the character's side.
-        elevation_deg: How far it looks down.
-        distance: How far the camera stays from the character [m].
-        calm_s: Time over which the camera's way is smoothed [s].
-        shadows: Whether things throw shadows; it costs time without a graphics card.
-        quality: Constant rate factor of H.264: less is better and larger.
-    """
-
-    dye: float = 0.8
-    turn_deg: float = 35.0
-    elevation_deg: float = 14.0
-    distance: float = 3.6
-    calm_s: float = 0.35
-    shadows: bool = True
-    quality: int = 20
 
 
 def write_video(
@@ -74,7 +59,6 @@ def write_video(
     path: Path | str,
     size: tuple[int, int] = (960, 540),
     fps: float | None = None,
-    config: VideoConfig | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """Write a story as an MP4 (H.264, 4:2:0); the file is whole or not there.
@@ -84,7 +68,6 @@ def write_video(
         path: The file; missing folders are made.
         size: Width and height in pixels, both even.
         fps: Frames per second; that of the story by default, but at most 60.
-        config: How it is drawn.
         progress: Called now and then with frames done and frames in all.
 
     Raises:
@@ -98,15 +81,15 @@ def write_video(
     fps = min(story.motion.fps, 60.0) if fps is None else fps
     if not 1.0 <= fps <= 240.0:
         raise UsageError(f"a video's frame rate must be 1 to 240, got {fps}")
-    arrays = _script(story, size, fps, config or VideoConfig())
+    arrays = _script(story, size, fps)
     failures: list[str] = []
     with _temporary_folder() as folder, replacing(path) as video:
         script = _save(folder, arrays)
-        for way in _ways():
-            failure = _work(script, video, way, progress)
+        for renderer in _renderers():
+            failure = _work(script, video, renderer, progress)
             if failure is None:
                 return
-            failures.append(f"{way or 'default'}: {failure}")
+            failures.append(f"{renderer or 'default'}: {failure}")
         raise RenderingUnavailableError(
             "cannot draw a video on this machine (" + "; ".join(failures) + "). On Debian or "
             "Ubuntu install libosmesa6, or libegl1 and libgl1, and try again; recording and "
@@ -116,7 +99,7 @@ def write_video(
 
 @contextmanager
 def _temporary_folder() -> Iterator[Path]:
-    """A folder that is gone when the block ends.
+    """A temporary folder that is removed when the block ends.
 
     Raises:
         DynrespError: There is no place for it.
@@ -132,7 +115,7 @@ def _temporary_folder() -> Iterator[Path]:
 
 
 def _save(folder: Path, arrays: dict[str, FloatArray]) -> Path:
-    """Write what the worker reads."""
+    """Write the file that the worker reads."""
     script = folder / "script.npz"
     try:
         np.savez(script, allow_pickle=False, **arrays)
@@ -148,8 +131,8 @@ def _no_space(error: OSError) -> DynrespError:
     )
 
 
-def _ways() -> list[str]:
-    """Values of MUJOCO_GL to try, what the user asked for first; "" leaves it to MuJoCo."""
+def _renderers() -> list[str]:
+    """Values of MUJOCO_GL to try, the user's first; "" leaves the choice to MuJoCo."""
     usual = ["egl", "osmesa"] if sys.platform.startswith("linux") else [""]
     told = os.environ.get(ASKED_VARIABLE) or os.environ.get(GL_VARIABLE, "")
     return [told, *(way for way in usual if way != told)] if told else usual
@@ -158,7 +141,7 @@ def _ways() -> list[str]:
 def _work(
     script: Path, video: Path, way: str, progress: Callable[[int, int], None] | None
 ) -> str | None:
-    """Let a process of its own draw; None if it did, else why not in a few words."""
+    """Draw in a process of its own; return None, or in a few words why it failed."""
     environment = dict(os.environ)
     environment.pop(GL_VARIABLE, None)
     environment.pop("PYOPENGL_PLATFORM", None)
@@ -219,29 +202,27 @@ def _work(
         return lines[-1][:200] if lines else f"exit code {code}"
 
 
-def _script(
-    story: Story, size: tuple[int, int], fps: float, config: VideoConfig
-) -> dict[str, FloatArray]:
-    """All that the worker needs, as arrays: solids, where they are, colours and the camera."""
+def _script(story: Story, size: tuple[int, int], fps: float) -> dict[str, FloatArray]:
+    """All that the worker needs, as arrays: solids, their poses, colours and the camera."""
     times = np.arange(int(story.duration * fps + 1e-6) + 1) / fps
     frames = np.array([story.frame_at(float(time)) for time in times])
-    cast = Cast(story)
+    solids = SceneSolids(story)
     actors = _Actors(frames)
     dyes = {
-        phase: shapes.phase_colors(cast.solids, phase, config.dye)
+        phase: shapes.phase_colors(solids.solids, phase, _DYE)
         for phase in {story.phase_at(float(time)) for time in times}
     }
     colors = [dyes[story.phase_at(float(time))] for time in times]
-    for i, solid in enumerate(cast.solids):
+    for i, solid in enumerate(solids.solids):
         actors.add(
             solid.mesh,
-            cast.states.positions[:, solid.body],
-            cast.states.quaternions[:, solid.body],
+            solids.states.positions[:, solid.body],
+            solids.states.quaternions[:, solid.body],
             [row[i] for row in colors],
         )
-    for number, states in enumerate(cast.others):
+    for number, states in enumerate(solids.others):
         for solid, color in zip(
-            cast.solids, shapes.other_colors(cast.solids, number), strict=True
+            solids.solids, shapes.other_colors(solids.solids, number), strict=True
         ):  # fmt: skip
             last = np.minimum(np.arange(len(story.motion)), len(states.positions) - 1)
             actors.add(
@@ -255,41 +236,38 @@ def _script(
     for rod in story.capsules:
         mesh = shapes.capsule(rod.radius, rod.half_length, shapes.CAPSULE_COLOR)
         actors.add(mesh, rod.positions, rod.quaternions)
-    for mesh in (*cast.blocks(), *cast.lines(), *cast.edge()):
+    for mesh in (*solids.blocks(), *solids.lines(), *solids.edge()):
         actors.add(mesh, np.zeros((len(story.motion), 3)))
     return {
         **actors.arrays(),
-        **_camera(story, frames, config, fps),
+        **_camera(story, frames, fps),
         "size": np.array(size),
         "fps": np.array(fps),
-        "shadows": np.array(config.shadows),
-        "quality": np.array(config.quality),
+        "quality": np.array(_QUALITY),
     }
 
 
-def _camera(
-    story: Story, frames: np.ndarray, config: VideoConfig, fps: float
-) -> dict[str, FloatArray]:
-    """A camera that follows the character calmly: where it looks, and from where."""
+def _camera(story: Story, frames: np.ndarray, fps: float) -> dict[str, FloatArray]:
+    """The path of a camera that follows the character smoothly."""
     from scipy.ndimage import gaussian_filter1d
 
     target = story.motion.root_positions[frames].copy()
     # Half way between the pelvis and a standing person's middle, so that it sinks with a fall.
     target[:, 2] = 0.5 * (target[:, 2] + 0.85)
     return {
-        "target": gaussian_filter1d(target, config.calm_s * fps, axis=0, mode="nearest"),
+        "target": gaussian_filter1d(target, _SMOOTHING_S * fps, axis=0, mode="nearest"),
         "view": np.array(
             [
-                np.degrees(camera_yaw(story, float(np.radians(config.turn_deg)))),
-                -config.elevation_deg,
-                config.distance,
+                np.degrees(camera_yaw(story, float(_TURN))),
+                -_ELEVATION_DEG,
+                _DISTANCE,
             ]
         ),
     }
 
 
 class _Actors:
-    """Solids and their ways, gathered as arrays."""
+    """Solids and their paths, gathered as arrays."""
 
     def __init__(self, frames: np.ndarray) -> None:
         self._frames = frames

@@ -105,7 +105,7 @@ def scene(
     bottom = min(layer.top - layer.rgba.shape[0] for layer in layers)
     canvas = raster.Canvas(left, top, right - left, top - bottom)
     for layer, alpha in zip(layers, (0.3, 1.0), strict=True):
-        canvas.lay(layer, alpha=alpha)
+        canvas.paste(layer, alpha=alpha)
     extent = np.array([left, right, bottom, top]) * _PIXEL
     axes.imshow(canvas.picture(), extent=tuple(extent), interpolation="antialiased")
     axes.set_axis_off()

@@ -33,7 +33,7 @@ from dynresp.experiments.response_files import direction_words, reaction_title
 from dynresp.experiments.response_story import response_story
 from dynresp.response.budget import chooser_for
 from dynresp.response.responder import Responder
-from dynresp.view.filmstrip import FilmstripConfig, write_filmstrip
+from dynresp.view.filmstrip import write_filmstrip
 
 COUNT, SEED = (10 if study.FULL else 1), 2007
 WIDTH_PX = 680
@@ -97,9 +97,7 @@ def strip(sample, response, who: str) -> Pixels.Image:
     )
     story = response_story(response, sample.impact, 0.5, title, subtitle).story
     with tempfile.TemporaryDirectory() as folder:
-        write_filmstrip(
-            story, Path(folder) / "strip.png", FilmstripConfig(moments=7, width_px=1600)
-        )
+        write_filmstrip(story, Path(folder) / "strip.png", moments=7, width_px=1600)
         picture = Pixels.open(Path(folder) / "strip.png").convert("RGB")
     return picture.resize(
         (WIDTH_PX, round(picture.height * WIDTH_PX / picture.width)), Pixels.Resampling.LANCZOS

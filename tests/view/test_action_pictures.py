@@ -39,6 +39,6 @@ def ways(*ends: tuple[float, float]) -> list[FloatArray]:
 def test_a_picture_of_ways_that_end_at_one_place(tmp_path: Path) -> None:
     pose = default_character().rest_pose
     actions = [(way, pose) for way in ways((1.0, 0.0), (1.0, 0.0), (1.0, 0.05))]
-    options.write_options(actions, ["a", "b, in 1 s", "c"], tmp_path / "options.png")
+    options.write_action_pictures(actions, ["a", "b, in 1 s", "c"], tmp_path / "options.png")
     assert (tmp_path / "options.png").read_bytes().startswith(b"\x89PNG")
     assert [file.name for file in tmp_path.iterdir()] == ["options.png"]

@@ -10,11 +10,11 @@ import pytest
 
 from dynresp.motion.motion import Motion
 from dynresp.support.errors import DynrespError
-from dynresp.view.filmstrip import FilmstripConfig, write_filmstrip
+from dynresp.view.filmstrip import write_filmstrip
 from dynresp.view.story import Block, GroundPath, MovingCapsule, Story, StoryEvent, StoryPhase
 from tests.view.samples import story_of, striding
 
-SMALL = FilmstripConfig(width_px=700, moments=5)
+SMALL = {"width_px": 700, "moments": 5}
 FILES = ("a.png", "b.png")
 BASE = (0.30, 0.50, 0.74)
 """Colour of a shirt during the base motion."""
@@ -31,7 +31,7 @@ def test_a_picture_of_the_width_asked_for(
     tmp_path: Path, story: Story, capfd: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "new" / "filmstrip.png"
-    write_filmstrip(story, file, SMALL)
+    write_filmstrip(story, file, **SMALL)
     picture = matplotlib.image.imread(file)
     assert picture.shape[1] == 700
     assert 200 < picture.shape[0] < 900
@@ -43,13 +43,13 @@ def test_a_picture_of_the_width_asked_for(
 
 
 def test_a_second_character_and_an_arm(tmp_path: Path, crowded_story: Story) -> None:
-    write_filmstrip(crowded_story, tmp_path / "a.png", SMALL)
+    write_filmstrip(crowded_story, tmp_path / "a.png", **SMALL)
     assert matplotlib.image.imread(tmp_path / "a.png").shape[1] == 700
 
 
 @pytest.mark.parametrize("frames", [1, 2])
 def test_the_shortest_motions(tmp_path: Path, frames: int) -> None:
-    write_filmstrip(Story(striding(frames, 1.0)), tmp_path / "a.png", SMALL)
+    write_filmstrip(Story(striding(frames, 1.0)), tmp_path / "a.png", **SMALL)
     picture = matplotlib.image.imread(tmp_path / "a.png")[..., :3]
     # A coloured figure stands on a grey floor.
     assert (np.ptp(picture, axis=-1) > 0.1).sum() > 300
@@ -57,30 +57,30 @@ def test_the_shortest_motions(tmp_path: Path, frames: int) -> None:
 
 def test_far_travel_needs_no_second_picture(tmp_path: Path) -> None:
     runner = story_of(striding(90, 4.0), events=[], phases=[])
-    write_filmstrip(runner, tmp_path / "far.png", SMALL)
+    write_filmstrip(runner, tmp_path / "far.png", **SMALL)
     idler = story_of(striding(90, 0.0), events=[], phases=[])
-    write_filmstrip(idler, tmp_path / "near.png", SMALL)
+    write_filmstrip(idler, tmp_path / "near.png", **SMALL)
     far, near = (matplotlib.image.imread(tmp_path / f"{n}.png") for n in ("far", "near"))
     assert far.shape[0] < 0.7 * near.shape[0]
 
 
 def test_same_story_same_picture(tmp_path: Path, story: Story) -> None:
     for name in ("a.png", "b.png"):
-        write_filmstrip(story, tmp_path / name, SMALL)
+        write_filmstrip(story, tmp_path / name, **SMALL)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_a_place_that_cannot_be_written(tmp_path: Path, story: Story) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DynrespError, match="cannot write"):
-        write_filmstrip(story, tmp_path / "file" / "x.png", SMALL)
+        write_filmstrip(story, tmp_path / "file" / "x.png", **SMALL)
 
 
 def test_a_very_long_way_is_shown_twice(tmp_path: Path) -> None:
     # Side by side the figures stay as large as they are on a short way.
     for name, frames in (("short", 90), ("long", 900)):
         walker = story_of(striding(frames, 4.0), events=[], phases=[], spheres=[])
-        write_filmstrip(walker, tmp_path / f"{name}.png", SMALL)
+        write_filmstrip(walker, tmp_path / f"{name}.png", **SMALL)
     short, long = (shirt_rows(tmp_path / f"{name}.png") for name in ("short", "long"))
     assert long > short
 
@@ -96,7 +96,7 @@ def shirt_rows(file: Path) -> int:
 def test_what_stands_is_in_the_lower_picture_and_the_picture_stays_small(tmp_path: Path) -> None:
     motion = striding(90, 0.0)
     alone = story_of(motion, events=[], phases=[], spheres=[])
-    write_filmstrip(alone, tmp_path / "alone.png", SMALL)
+    write_filmstrip(alone, tmp_path / "alone.png", **SMALL)
     # A wall far away, a bar above, and a world so large that no picture could hold it.
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (90, 1))
     among = story_of(
@@ -106,7 +106,7 @@ def test_what_stands_is_in_the_lower_picture_and_the_picture_stays_small(tmp_pat
         paths=[GroundPath("way", np.array([[-1.0, 0.5], [2.0, 0.5]]))],
         bounds=(-200.0, -200.0, 200.0, 200.0),
     )  # fmt: skip
-    write_filmstrip(among, tmp_path / "among.png", SMALL)
+    write_filmstrip(among, tmp_path / "among.png", **SMALL)
     before, after = (matplotlib.image.imread(tmp_path / f"{n}.png") for n in ("alone", "among"))
     assert before.shape[0] < after.shape[0] < 3 * before.shape[0]
 
@@ -128,7 +128,7 @@ def test_a_figure_lying_down(tmp_path: Path) -> None:
     tall = []
     for shown in (motion, Motion(poses, motion.fps)):
         story = story_of(shown, events=[], phases=[StoryPhase("base motion", 0.0, shown.duration)])
-        write_filmstrip(story, tmp_path / "a.png", SMALL)
+        write_filmstrip(story, tmp_path / "a.png", **SMALL)
         shirt = pixels_of(matplotlib.image.imread(tmp_path / "a.png"), BASE)
         assert shirt.sum() > 300
         tall.append(np.ptp(np.flatnonzero(shirt.any(axis=1))))
@@ -139,9 +139,9 @@ def test_a_figure_lying_down(tmp_path: Path) -> None:
 def test_dollar_signs_are_no_mathematics(tmp_path: Path) -> None:
     text = "price $\\foo{$ up"
     told = story_of(striding(30, 1.3), title=text, subtitle=text, events=[StoryEvent(text, 0.3)])
-    write_filmstrip(told, tmp_path / "a.png", SMALL)
+    write_filmstrip(told, tmp_path / "a.png", **SMALL)
     plain = story_of(striding(30, 1.3), title="", subtitle="", events=[StoryEvent("", 0.3)])
-    write_filmstrip(plain, tmp_path / "b.png", SMALL)
+    write_filmstrip(plain, tmp_path / "b.png", **SMALL)
     # The title is written, in dark letters on white: there is more ink than without it.
     ink = [int((matplotlib.image.imread(tmp_path / n)[:40, :, 0] < 0.5).sum()) for n in FILES]
     assert ink[0] > ink[1] + 100

@@ -7,13 +7,13 @@ import pytest
 
 from dynresp.support.errors import DynrespError
 from dynresp.view.body_shapes import BLOCK_COLOR, BOUNDS_COLOR, PATH_COLORS
-from dynresp.view.ground_plan import write_plan
+from dynresp.view.ground_plan import write_ground_plan
 from dynresp.view.story import Block, GroundPath, MovingCapsule, Story
 from tests.view.samples import story_of, striding
 
 
 def picture(story: Story, folder: Path, marks: tuple[float, ...] = ()) -> npt.NDArray[np.float32]:
-    write_plan(story, folder / "plan.png", marks)
+    write_ground_plan(story, folder / "plan.png", marks)
     found: npt.NDArray[np.float32] = matplotlib.image.imread(folder / "plan.png")[..., :3]
     return found
 
@@ -65,4 +65,4 @@ def test_a_long_walk_has_room_for_its_arrows(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DynrespError, match="cannot write"):
-        write_plan(story_of(striding(30, 1.0)), tmp_path / "file" / "x.png")
+        write_ground_plan(story_of(striding(30, 1.0)), tmp_path / "file" / "x.png")

@@ -61,30 +61,30 @@ def test_only_what_is_on_the_canvas_is_drawn() -> None:
     view, pixel = raster.Projection.looking(0.2, 0.3), 0.01
     meshes = [ball(0.3, (0.0, 0.0, 0.0), RED), ball(0.2, (0.1, 0.2, 0.3), GREEN)]
     whole, cut = (raster.Canvas(left=-10, top=20, width=25, height=30) for _ in range(2))
-    whole.lay(raster.draw(meshes, view, pixel))
-    cut.lay(raster.draw(meshes, view, pixel, canvas=cut))
+    whole.paste(raster.draw(meshes, view, pixel))
+    cut.paste(raster.draw(meshes, view, pixel, canvas=cut))
     np.testing.assert_allclose(cut.rgba, whole.rgba, atol=1e-6)
     # A world without end costs no memory, and what is beside the canvas is left out.
     huge = [shapes.box((1e5, 1e5, 0.1), RED), *meshes]
     assert raster.draw(huge, view, pixel, canvas=cut).rgba.shape == (30, 25, 4)
     away = raster.draw([ball(0.1, (0.0, 50.0, 0.0), RED)], view, pixel, canvas=cut)
     assert away.rgba.size == 0
-    cut.lay(away)
+    cut.paste(away)
     np.testing.assert_allclose(cut.rgba, whole.rgba, atol=1e-6)
 
 
 def test_layers_are_cut_at_the_edges_of_a_canvas() -> None:
     layer = raster.Layer(np.full((4, 4, 4), 0.5), left=-2, top=2)
     canvas = raster.Canvas(left=0, top=10, width=5, height=10)
-    canvas.lay(layer)
+    canvas.paste(layer)
     assert canvas.rgba[8:, :2, 3].tolist() == [[0.5, 0.5], [0.5, 0.5]]
     assert canvas.rgba[..., 3].sum() == 2.0
-    canvas.lay(layer, right=50)
-    canvas.lay(layer, up=50)
-    canvas.lay(layer, right=-50, up=-50)
+    canvas.paste(layer, right=50)
+    canvas.paste(layer, up=50)
+    canvas.paste(layer, right=-50, up=-50)
     assert canvas.rgba[..., 3].sum() == 2.0
     # Half of a half over a half.
-    canvas.lay(layer, alpha=0.5)
+    canvas.paste(layer, alpha=0.5)
     assert canvas.rgba[9, 0, 3] == 0.25 + 0.75 * 0.5
     assert canvas.picture()[9, 0].tolist() == [255, 255, 255, 159]
     assert canvas.picture()[0, 0].tolist() == [0, 0, 0, 0]

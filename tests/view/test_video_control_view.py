@@ -3,41 +3,41 @@ import pytest
 
 from dynresp.motion.builtin.builtin_motions import load_builtin
 from dynresp.view.video_control_view import (
-    Seen,
-    TimeLine,
-    Watched,
+    ActionTimeline,
+    VideoControlStory,
+    VideoMoment,
     _part,
     _runs,
     letter,
-    write_watched,
+    write_video_control,
 )
 
 
-def moment(time_s: float, rows: slice, columns: slice) -> Seen:
+def moment(time_s: float, rows: slice, columns: slice) -> VideoMoment:
     """A grey picture with somebody in a part of it."""
     mask = np.zeros((240, 320), dtype=np.uint8)
     mask[rows, columns] = 255
-    return Seen(time_s, np.full((240, 320, 3), 120, dtype=np.uint8), mask)
+    return VideoMoment(time_s, np.full((240, 320, 3), 120, dtype=np.uint8), mask)
 
 
-def watched(moments: list[Seen], actions: int) -> Watched:
+def watched(moments: list[VideoMoment], actions: int) -> VideoControlStory:
     motion = load_builtin("walk")
     told = [None, *(k % actions for k in range(19))]
-    line = TimeLine([0.1 * (k + 1) for k in range(20)], told, told, [0, *told[1:]])
+    line = ActionTimeline([0.1 * (k + 1) for k in range(20)], told, told, [0, *told[1:]])
     poses = np.repeat(motion.poses[:1], actions, axis=0)
-    return Watched(motion, moments, line, poses, ["goes on, turns left"] * actions)
+    return VideoControlStory(motion, moments, line, poses, ["goes on, turns left"] * actions)
 
 
 @pytest.mark.parametrize("actions", [1, 12])
 def test_it_is_drawn(tmp_path, actions: int) -> None:
     everywhere = moment(0.3, slice(None), slice(None))
     moments = [everywhere, *(moment(0.1 * k, slice(50, 90), slice(9 * k, 40)) for k in range(4))]
-    write_watched(watched(moments, actions), tmp_path / "a.png", "Title", "of $x.mp4")
+    write_video_control(watched(moments, actions), tmp_path / "a.png", "Title", "of $x.mp4")
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_video_in_which_nobody_is_at_the_moments_shown(tmp_path) -> None:
-    write_watched(watched([], 3), tmp_path / "a.png", "", "")
+    write_video_control(watched([], 3), tmp_path / "a.png", "", "")
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 

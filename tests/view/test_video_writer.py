@@ -49,7 +49,7 @@ def test_a_film_that_plays_everywhere(
 
 
 def test_the_script_says_where_all_is(crowded_story: Story) -> None:
-    script = video._script(crowded_story, (320, 240), 15.0, video.VideoConfig())
+    script = video._script(crowded_story, (320, 240), 15.0)
     assert script["poses"].shape == (15, len(script["vertex_counts"]), 7)
     assert script["vertex_counts"].sum() == len(script["vertices"])
     # The arm is there for 25 of 30 frames.
@@ -57,8 +57,8 @@ def test_the_script_says_where_all_is(crowded_story: Story) -> None:
     assert absent == [False] * 13 + [True] * 2
 
 
-def test_no_way_to_draw(tmp_path: Path, story: Story, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(video, "_ways", lambda: ["no-such-thing"])
+def test_no_renderer(tmp_path: Path, story: Story, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(video, "_renderers", lambda: ["no-such-thing"])
     with pytest.raises(RenderingUnavailableError, match=r"no-such-thing.*libosmesa6.*libegl1"):
         write_video(story, tmp_path / "a.mp4", (64, 64))
     assert not list(tmp_path.iterdir())
@@ -75,7 +75,7 @@ def test_a_driver_that_crashes(
 
 def test_a_driver_that_hangs(tmp_path: Path, story: Story, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(video.sys, "executable", fake_python(tmp_path, "exec sleep 30"))
-    monkeypatch.setattr(video, "_ways", lambda: ["egl"])
+    monkeypatch.setattr(video, "_renderers", lambda: ["egl"])
     monkeypatch.setattr(video, "_STALL_S", 0.3)
     with pytest.raises(RenderingUnavailableError, match=r"no picture within 0\.3 s"):
         write_video(story, tmp_path / "out" / "a.mp4", (64, 64))
@@ -84,9 +84,9 @@ def test_a_driver_that_hangs(tmp_path: Path, story: Story, monkeypatch: pytest.M
 def test_what_the_user_chose_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(video.sys, "platform", "linux")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    assert video._ways() == ["osmesa", "egl"]
+    assert video._renderers() == ["osmesa", "egl"]
     monkeypatch.delenv("MUJOCO_GL")
-    assert video._ways() == ["egl", "osmesa"]
+    assert video._renderers() == ["egl", "osmesa"]
 
 
 @pytest.mark.parametrize("size", [(321, 240), (0, 240), (320, 5000)])
