@@ -15,7 +15,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.composition import Composition
 from dynresp.motion.builtin import PREFIX
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from dynresp.response.response_quality import joint_speed_steps
 from dynresp.results.result_folder import PLAN, RESULT, WRITTEN, clear_response
@@ -184,7 +184,7 @@ def skate(motion: Motion, character: Character) -> dict[str, float] | None:
     """
     if motion.fps < _SKATE_FPS:
         return None
-    slips = foot_skates(motion, character) or [0.0]
+    slips = stance_slides(motion, character) or [0.0]
     return {
         "median": float(np.median(slips)),
         "percentile_95": float(np.percentile(slips, 95.0)),

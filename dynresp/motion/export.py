@@ -42,7 +42,7 @@ def write_npz(motion: Motion, path: str | Path, character: Character) -> None:
 
     Args:
         motion: What to write.
-        path: The file, by custom ending in .npz; missing folders are made, an old file is replaced.
+        path: The file, usually ending in .npz; missing folders are made, an old file is replaced.
         character: The character that the motion is of.
 
     Raises:
@@ -75,7 +75,7 @@ def write_bvh(motion: Motion, path: str | Path, character: Character) -> None:
 
     Args:
         motion: What to write. Foot contacts, labels and the name have no place in a BVH file.
-        path: The file, by custom ending in .bvh; missing folders are made, an old file is replaced.
+        path: The file, usually ending in .bvh; missing folders are made, an old file is replaced.
         character: The character that the motion is of.
 
     Raises:
@@ -158,7 +158,7 @@ def _offset(vector: FloatArray) -> str:
 def _tip(character: Character, body: int) -> FloatArray:
     """Where a body without children ends, in its frame [m].
 
-    The far side of the capsule that lies farthest out, along the axis on which it does: the top of
+    The far side of the capsule that is farthest out, along that axis: the top of
     the head, the finger tips, the toes.
     """
     model = character.model

@@ -126,7 +126,7 @@ class Motion:
         """Frames start to stop (stop not included).
 
         Raises:
-            MotionError: The range is empty or lies outside.
+            MotionError: The range is empty or outside the motion.
         """
         if not 0 <= start < stop <= len(self):
             raise MotionError(

@@ -96,7 +96,7 @@ def find_motion(name: str, folders: Sequence[Path], beside: Path) -> Path | str 
     Raises:
         MotionFileError: It can only be a file, and there is none.
         SpecError: The path leads out of the motions folders.
-        UsageError: It begins with the home folder of nobody.
+        UsageError: It begins with the home folder of an unknown user.
     """
     if name.startswith(BUILTIN_PREFIX):
         return name.removeprefix(BUILTIN_PREFIX)

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT, Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.ground import clearances
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
@@ -92,7 +92,7 @@ def measure(response: Response, character: Character) -> Quality | None:
     states = character.kinematics(after.poses)
     depth = np.maximum(0.0, -clearances(character, states))
     feet = [character.body(f"{side}_foot") for side in FEET]
-    skates = foot_skates(after, character)
+    skates = stance_slides(after, character)
     blend = motion.slice(response.exit, response.end + 1)
     return Quality(
         speed_step_exit=at_seams[0],
@@ -105,7 +105,7 @@ def measure(response: Response, character: Character) -> Quality | None:
         root_shake_deg=max(shake[1] for shake in shakes),
         foot_skate_m=float(sum(skates)),
         foot_skate_worst_m=float(max(skates, default=0.0)),
-        foot_skate_blend_m=float(sum(foot_skates(blend, character))),
+        foot_skate_blend_m=float(sum(stance_slides(blend, character))),
         foot_depth_m=float(depth[:, feet].max()),
         body_depth_m=float(np.delete(depth, feet, axis=1).max()),
         free_physics_s=(response.exit - response.contact_frame) / motion.fps,

@@ -11,7 +11,7 @@ from dynresp.locomotion.graph.placement import place_poses
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import compose
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
@@ -87,7 +87,7 @@ class _Seen:
                 stages[CUT] = place_poses(graph.database.poses[made.frames], made.placements)
             for stage, poses in stages.items():
                 motion = Motion(poses, fps, stage, made.motion.contacts)
-                slides[stage] += foot_skates(motion, character)
+                slides[stage] += stance_slides(motion, character)
                 steps[stage].append(at_jumps(motion, made.jumps, rate))
         return cls(
             {stage: np.array(ways) for stage, ways in slides.items() if ways},

@@ -31,7 +31,7 @@ from dynresp.locomotion.worlds.terrain_walk import (
     wander_on_terrain,
 )
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from studies.graphs.graph_study import of_graphs
 from studies.study import Study, Target, Value
@@ -145,7 +145,7 @@ def _playground(
     graph: MotionGraph, character: Character, count: int, seed: int
 ) -> Mapping[str, Value]:
     played = [play(graph, character, seed + k) for k in range(count)]
-    skates = np.concatenate([foot_skates(motion, character) for _, _, motion in played])
+    skates = np.concatenate([stance_slides(motion, character) for _, _, motion in played])
     found: dict[str, Value] = {
         "seconds": count * _PLAYED_S,
         "holds": sum(len(before.slip) for before, _, _ in played),

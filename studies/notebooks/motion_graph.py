@@ -41,7 +41,7 @@ from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import compose
 from dynresp.locomotion.playing.gait_measures import measure_gait
 from dynresp.motion.character import default_character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 
 study.style()
 character = default_character()
@@ -322,7 +322,7 @@ outings["walk at random"] = Outing.of(composition, walking, title="", subtitle="
 
 def slides(motions):
     """How far feet slide, over all stances of some motions."""
-    slips = [slip for motion in motions for slip in foot_skates(motion, character)]
+    slips = [slip for motion in motions for slip in stance_slides(motion, character)]
     cm = (np.median(slips), np.percentile(slips, 95.0), np.max(slips))
     return (len(slips), *(f"{100 * x:.2f}" for x in cm))
 

@@ -10,7 +10,7 @@ from dynresp.motion.builtin import builtin_info, builtin_names, load_builtin, ma
 from dynresp.motion.builtin.course import balance, center_of_mass
 from dynresp.motion.builtin.keypose_spec import read_spec
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import FEET, Motion
 from dynresp.support.errors import SpecError
 
@@ -93,7 +93,7 @@ def test_balance_sways_less_the_slower_it_can_fall() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_standing_feet_stand_on_something(name: str, character: Character) -> None:
     motion = load_builtin(name, character)
-    assert max(foot_skates(motion, character)) < 0.001
+    assert max(stance_slides(motion, character)) < 0.001
     states = character.kinematics(motion.poses)
     low = ground.clearances(character, states)
     for i, side in enumerate(FEET):

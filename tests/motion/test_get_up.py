@@ -13,7 +13,7 @@ from dynresp.motion.builtin import FLAT, builtin_folder, builtin_info, load_buil
 from dynresp.motion.builtin.hands import hand_tip, hand_tracks
 from dynresp.motion.builtin.keypose_spec import read_spec
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import FEET, Motion
 from dynresp.support.errors import SpecError
 
@@ -55,7 +55,7 @@ def test_something_rests_on_the_ground_and_nothing_sinks_in(
 @pytest.mark.parametrize("name", NAMES)
 def test_hands_feet_and_the_kneeling_knee_stay(name: str, character: Character) -> None:
     motion = load_builtin(name)
-    assert max(foot_skates(motion, character)) < 1e-3
+    assert max(stance_slides(motion, character)) < 1e-3
     states = character.kinematics(motion.poses)
     spec = read_spec(builtin_folder() / f"{name}.toml")
     times = np.arange(len(motion)) / motion.fps

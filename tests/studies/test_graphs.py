@@ -126,7 +126,7 @@ def test_feet_of_a_walk_without_jumps(graph: MotionGraph, character: Character) 
 def test_feet_of_a_walk_without_stances(
     graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(feet_and_jumps, "foot_skates", lambda *_: [])
+    monkeypatch.setattr(feet_and_jumps, "stance_slides", lambda *_: [])
     with pytest.raises(UsageError, match="100 frames hold no stance or no jump; give a larger"):
         feet_and_jumps.measure(graph, character, 100, 1)
 

@@ -22,7 +22,7 @@ from dynresp.support.paths import reactions_folder
 
 if TYPE_CHECKING:
     from dynresp.motion.builtin.course_spec import Course
-    from dynresp.motion.builtin.footing import FootTrack
+    from dynresp.motion.builtin.footing import FootTargets
     from dynresp.motion.builtin.keypose_spec import BuiltinSpec
     from dynresp.motion.rotations import FloatArray
 
@@ -113,7 +113,7 @@ def make_motion(spec: BuiltinSpec, character: Character) -> Motion:
     return Motion(poses, spec.fps, name, contacts, (label,))
 
 
-def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
+def make_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTargets]]:
     """Poses (frames, 59) of a file, and where its left and right foot were to be."""
     from dynresp.motion.builtin import course, footing, hands, keyposes
     from dynresp.motion.builtin import steady_walk as gait

@@ -25,7 +25,7 @@ import numpy as np
 from dynresp.motion import rotations
 from dynresp.motion.builtin.course_feet import foot_track
 from dynresp.motion.builtin.course_plan import FULL_STEP, GRAVITY, CoursePlan, plan_course
-from dynresp.motion.builtin.footing import FootTrack, Sole, place_feet
+from dynresp.motion.builtin.footing import FootTargets, Sole, place_feet
 from dynresp.motion.builtin.keypose_spec import BuiltinSpec
 from dynresp.motion.builtin.keyposes import add_sway, channel_poses, frame_times
 from dynresp.motion.builtin.posture_spec import CHANNELS
@@ -65,7 +65,7 @@ _WALKING = {
 }  # fmt: skip
 
 
-def course_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
+def course_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTargets]]:
     """Poses (frames, 59) of a file with a course, and the tracks of its feet."""
     if spec.course is None:
         raise ValueError(f"{spec.name} has no course")
@@ -131,8 +131,8 @@ def center_of_mass(character: Character, poses: FloatArray) -> FloatArray:
 
 
 def _within_reach(
-    character: Character, poses: FloatArray, track: FootTrack, side: str, fps: float
-) -> FootTrack:
+    character: Character, poses: FloatArray, track: FootTargets, side: str, fps: float
+) -> FootTargets:
     """The track, moved towards the hip where it swings farther away than a leg reaches well."""
     from scipy.ndimage import distance_transform_edt
 
@@ -151,7 +151,7 @@ def _within_reach(
 
 
 def _channels(
-    plan: CoursePlan, tracks: Sequence[FootTrack], times: FloatArray, fps: float
+    plan: CoursePlan, tracks: Sequence[FootTargets], times: FloatArray, fps: float
 ) -> dict[str, FloatArray]:
     """What the body does, except where the pelvis is over the ground."""
     channels = {name: np.zeros(len(times)) for name in CHANNELS}
@@ -181,7 +181,7 @@ def _channels(
     return channels
 
 
-def _point_knees(channels: dict[str, FloatArray], tracks: Sequence[FootTrack]) -> None:
+def _point_knees(channels: dict[str, FloatArray], tracks: Sequence[FootTargets]) -> None:
     """Turn the legs half-way from the pelvis to where the toes point: the knees bend there."""
     facing = np.radians(channels["pelvis.yaw"])
     for side, outward, track in zip(FEET, (1.0, -1.0), tracks, strict=True):

@@ -17,7 +17,7 @@ import numpy as np
 
 from dynresp.motion import rotations
 from dynresp.motion.builtin.course_plan import SWING_PITCH, Footfall
-from dynresp.motion.builtin.footing import FootTrack, Sole, planted
+from dynresp.motion.builtin.footing import FootTargets, Sole, planted
 from dynresp.motion.rotations import FloatArray
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ _DRAWN_UP = (0.35, 0.60)
 _RAISING, _PASSING = 0.30, 0.16
 
 
-def foot_track(falls: Sequence[Footfall], sole: Sole, times: FloatArray) -> FootTrack:
+def foot_track(falls: Sequence[Footfall], sole: Sole, times: FloatArray) -> FootTargets:
     """The track of one foot.
 
     Args:
@@ -65,7 +65,7 @@ def foot_track(falls: Sequence[Footfall], sole: Sole, times: FloatArray) -> Foot
         gap = np.flatnonzero((times > before.leave + 1e-9) & (times < after.land - 1e-9))
         u = (times[gap] - before.leave) / (after.land - before.leave)
         ankles[gap], feet[gap] = _swing(sole, before, after, u)
-    return FootTrack(ankles, feet, np.ones(frames), locked)
+    return FootTargets(ankles, feet, np.ones(frames), locked)
 
 
 def _planted(

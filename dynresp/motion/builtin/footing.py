@@ -32,7 +32,7 @@ _RAISE_TIME = 0.10
 
 
 @dataclass(frozen=True)
-class FootTrack:
+class FootTargets:
     """Where one foot has to be, frame by frame.
 
     Attributes:
@@ -47,10 +47,10 @@ class FootTrack:
     weights: FloatArray
     locked: npt.NDArray[np.bool_]
 
-    def between(self, start: int, stop: int) -> FootTrack:
+    def between(self, start: int, stop: int) -> FootTargets:
         """Frames start to stop (stop not included)."""
         part = slice(start, stop)
-        return FootTrack(
+        return FootTargets(
             self.ankles[part], self.quaternions[part], self.weights[part], self.locked[part]
         )
 
@@ -117,7 +117,7 @@ def planted(
 
 def stance_track(
     stances: Sequence[Stance], sole: Sole, times: FloatArray, outward: float
-) -> FootTrack:
+) -> FootTargets:
     """The track of one foot from its stances, in order of time.
 
     Args:
@@ -130,7 +130,7 @@ def stance_track(
     ankles, feet = np.zeros((frames, 3)), rotations.identity(frames)
     weights, locked = np.zeros(frames), np.zeros(frames, dtype=np.bool_)
     if not stances:
-        return FootTrack(ankles, feet, weights, locked)
+        return FootTargets(ankles, feet, weights, locked)
     pitch = _pitch(stances, times)
     turns = [np.radians(outward * stance.turn) for stance in stances]
 
@@ -163,7 +163,7 @@ def stance_track(
             near = _between(times, stance.start - blend, stance.start)
             ankles[near], feet[near] = planted(sole, stance.at, turn, pitch[near])
             weights[near] = 1.0 - rotations.ease((stance.start - times[near]) / blend)
-    return FootTrack(ankles, feet, weights, locked)
+    return FootTargets(ankles, feet, weights, locked)
 
 
 def _between(times: FloatArray, start: float, stop: float) -> npt.NDArray[np.intp]:
@@ -210,7 +210,7 @@ def _pitch(stances: Sequence[Stance], times: FloatArray) -> FloatArray:
 
 
 def place_feet(
-    character: Character, poses: FloatArray, tracks: Sequence[FootTrack], fps: float
+    character: Character, poses: FloatArray, tracks: Sequence[FootTargets], fps: float
 ) -> FloatArray:
     """Bring the feet onto their tracks; the root is lowered where a leg would be too short.
 
@@ -238,7 +238,7 @@ def place_feet(
     return legs.place_ankles(character, out, ankles, np.stack(feet, axis=1))
 
 
-def _too_far(character: Character, poses: FloatArray, tracks: Sequence[FootTrack]) -> FloatArray:
+def _too_far(character: Character, poses: FloatArray, tracks: Sequence[FootTargets]) -> FloatArray:
     """By how much the root must come down for the standing legs to reach the ground (frames,)."""
     states = character.kinematics(poses)
     drop = np.zeros(len(poses))

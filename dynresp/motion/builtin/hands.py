@@ -24,7 +24,7 @@ BLEND_TIME = 0.25
 
 
 @dataclass(frozen=True)
-class HandTrack:
+class HandTargets:
     """Where one hand has to be, frame by frame.
 
     Attributes:
@@ -46,7 +46,7 @@ def hand_tip(character: Character, side: str) -> tuple[FloatArray, float]:
 
 def hand_tracks(
     props: Sequence[Prop], character: Character, times: FloatArray
-) -> tuple[HandTrack, HandTrack]:
+) -> tuple[HandTargets, HandTargets]:
     """Where the left and the right hand have to be at some times [s]."""
     tracks = []
     for side in FEET:
@@ -59,11 +59,13 @@ def hand_tracks(
             nearer = weight > weights
             tips[nearer] = [*prop.at, radius]
             weights = np.maximum(weights, weight)
-        tracks.append(HandTrack(tips, weights))
+        tracks.append(HandTargets(tips, weights))
     return tracks[0], tracks[1]
 
 
-def place_hands(character: Character, poses: FloatArray, tracks: Sequence[HandTrack]) -> FloatArray:
+def place_hands(
+    character: Character, poses: FloatArray, tracks: Sequence[HandTargets]
+) -> FloatArray:
     """Bring the hands onto their tracks.
 
     Args:

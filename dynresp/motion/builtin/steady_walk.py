@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion import rotations
-from dynresp.motion.builtin.footing import FootTrack, Sole, place_feet, planted
+from dynresp.motion.builtin.footing import FootTargets, Sole, place_feet, planted
 from dynresp.motion.builtin.keypose_spec import CYCLE_POINTS, BuiltinSpec, Gait
 from dynresp.motion.builtin.keyposes import add_sway, channel_poses, frame_times
 from dynresp.motion.builtin.posture_spec import CHANNELS
@@ -32,7 +32,7 @@ _CURVE_OF = {
 }
 
 
-def walk_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTrack]]:
+def walk_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, list[FootTargets]]:
     """Poses (frames, 59) of a file with gait curves, and the tracks of its feet.
 
     The walk goes along +X from near the origin, the left heel touching down at time 0.
@@ -79,7 +79,7 @@ def walk_poses(spec: BuiltinSpec, character: Character) -> tuple[FloatArray, lis
 
 def _tracks(
     gait: Gait, character: Character, poses: FloatArray, phase: FloatArray, fps: float
-) -> list[FootTrack]:
+) -> list[FootTargets]:
     """Where the feet stand and how they swing; all stances are one step apart on a line."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -122,7 +122,7 @@ def _tracks(
         # A smooth maximum, whose rounding vanishes where the foot stands.
         above, rounding = ankles[:, 2] - floor, 3.0 * _TOE_CLEARANCE * over
         ankles[:, 2] = floor + 0.5 * (above + np.sqrt(above**2 + rounding**2))
-        tracks.append(FootTrack(ankles, foot, np.ones(len(phase)), locked))
+        tracks.append(FootTargets(ankles, foot, np.ones(len(phase)), locked))
     return tracks
 
 

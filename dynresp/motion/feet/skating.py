@@ -44,15 +44,15 @@ def foot_slides(character: Character, states: BodyStates) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def foot_skates(motion: Motion, character: Character) -> list[float]:
+def stance_slides(motion: Motion, character: Character) -> list[float]:
     """How far each foot slides in each of its stances [m].
 
     Summed over the steps between frames in both of which the foot stands (`motion.contacts`); first
     the left foot's stances, then the right one's. One frame alone has no step and is no stance.
     """
     slides = foot_slides(character, character.kinematics(motion.poses))
-    skates: list[float] = []
+    sums: list[float] = []
     for slide, contact in zip(slides.T, motion.contacts.T, strict=True):
         standing = contact[:-1] & contact[1:]
-        skates += [float(slide[start:stop].sum()) for start, stop in runs(standing)]
-    return skates
+        sums += [float(slide[start:stop].sum()) for start, stop in runs(standing)]
+    return sums

@@ -78,7 +78,7 @@ class AsfSkeleton:
     def joints(self) -> tuple[list[str], list[int], FloatArray]:
         """Names, parents and rest offsets (joints, 3) of the joints: bones, then their free ends.
 
-        A bone's joint lies where the bone starts, which is its parent's end; all bones of the root
+        A bone's joint is where the bone starts, which is its parent's end; all bones of the root
         start at the root.
         """
         names = [bone.name for bone in self.bones]

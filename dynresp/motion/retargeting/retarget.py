@@ -141,7 +141,7 @@ def _is_ours(
 def _straighten_hinges(world: FloatArray, character: Character) -> None:
     """Turn upper arms and thighs about their own axes so that elbows and knees bend as hinges do.
 
-    Where the zero of such turns lies is a matter of each source's calibration, and differs by 30
+    The zero of such turns depends on each source's calibration, and differs by 30
     degrees and more. One constant turn of the upper part, chosen so that over the whole motion the
     forearm bends forward and the shank backward, and one of the lower part, chosen so that it is
     not twisted on average, make motions of different sources comparable.

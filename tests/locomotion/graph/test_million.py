@@ -13,7 +13,7 @@ from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.playing.composition import compose
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from dynresp.support.arrays import IntArray
 from studies.graphs.speed_steps import at_jumps, source_limits
@@ -90,9 +90,9 @@ def test_feet_are_fitted_and_stand(walk: Walk, character: Character) -> None:
         made = compose(graph, character, walk.path[at : at + STRETCH])
         assert np.isfinite(made.motion.poses).all()
         jumped.append(at_jumps(made.motion, made.jumps))
-        slides += foot_skates(made.motion, character)
+        slides += stance_slides(made.motion, character)
         played = Motion(made.unfitted, graph.config.fps, "", made.motion.contacts)
-        before += foot_skates(played, character)
+        before += stance_slides(played, character)
     assert np.mean(np.array(before) < 0.01) < 0.1
     assert np.mean(np.array(slides) < 0.01) > 0.99
     assert np.median(slides) < 1e-3

@@ -8,7 +8,7 @@ from dynresp.locomotion.graph.placement import place_poses
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import Composition, compose, steps_at_rate
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import angle_between
 from dynresp.response.response_quality import joint_speed_steps
@@ -138,8 +138,8 @@ def test_nothing_is_broken_and_standing_feet_stay(
         assert np.isfinite(poses).all()
         norms = np.linalg.norm(poses[:, 3:].reshape(-1, 14, 4), axis=-1)
         np.testing.assert_allclose(norms, 1.0, atol=1e-9)
-    sliding = foot_skates(Motion(made.unfitted, fps, "sliding", made.motion.contacts), character)
-    fitted = foot_skates(made.motion, character)
+    sliding = stance_slides(Motion(made.unfitted, fps, "sliding", made.motion.contacts), character)
+    fitted = stance_slides(made.motion, character)
     assert len(fitted) == len(sliding) > 60
     assert np.percentile(sliding, 90) > 0.02
     assert np.percentile(fitted, 99) < 0.01

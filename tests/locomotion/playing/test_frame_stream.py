@@ -9,7 +9,7 @@ from dynresp.locomotion.playing import composition as composing
 from dynresp.locomotion.playing.composition import compose
 from dynresp.locomotion.playing.frame_stream import Stream
 from dynresp.motion.character import Character, default_character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from dynresp.support.errors import MotionError, UsageError
 from tests.locomotion.samples import walking_graph
@@ -48,7 +48,7 @@ def test_pieces_are_what_is_composed(graph: MotionGraph, character: Character, f
     assert stream.standing(100) is None
     assert stream.standing(stream.end) is None
     contacts = whole.contacts[1:]
-    assert np.percentile(foot_skates(Motion(poses, fps, "", contacts), character), 95) < 0.01
+    assert np.percentile(stance_slides(Motion(poses, fps, "", contacts), character), 95) < 0.01
 
 
 def test_a_clock_slower_than_the_graph_is_refused(graph: MotionGraph, character: Character) -> None:

@@ -19,7 +19,7 @@ from dynresp.locomotion.worlds.playground_fitting import (
 from dynresp.locomotion.worlds.world_contacts import palms
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
@@ -168,7 +168,7 @@ def test_hands_of_recorded_climbers_hold_on(motions_folder: Path, character: Cha
         assert np.median(loose.slip) > 0.04
         assert tight.slip.max() < 0.01
         assert tight.off_bar.max() < 0.06
-        slides = (foot_skates(x.motion, character) for x in (played, fitted))
+        slides = (stance_slides(x.motion, character) for x in (played, fitted))
         before, after = (float(np.sum(x)) for x in slides)
         assert after < before + 0.02
         # Nothing is bought by haste.

@@ -16,7 +16,7 @@ from dynresp.locomotion.worlds.world_contacts import standing_soles
 from dynresp.motion import rotations
 from dynresp.motion.builtin import FLAT, PREFIX, load_builtin
 from dynresp.motion.character import Character
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 
 
@@ -45,7 +45,7 @@ def test_feet_stand_on_the_stool_and_on_the_floor(
     character: Character, motions: list[Motion]
 ) -> None:
     for motion in motions:
-        assert max(foot_skates(motion, character)) < 0.001
+        assert max(stance_slides(motion, character)) < 0.001
         soles = standing_soles(character, motion.poses, motion.contacts)
         middle, low = soles.mean(axis=2), soles[..., 2].min(axis=2)
         on_top = low > 0.5 * SIDE_M

@@ -14,7 +14,7 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.feet import foot_fitting as foot_fitting_module
 from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP, STANCE_S, ComposedMotion, fit_feet
 from dynresp.motion.feet.foot_fitting_place_kernel import into_discs
-from dynresp.motion.feet.skating import TOUCH, foot_skates
+from dynresp.motion.feet.skating import TOUCH, stance_slides
 from dynresp.motion.ground import clearances, sole_points
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import FEET, Motion
@@ -324,7 +324,7 @@ class TestRealWalks:
         motion = load_motion(file, options=LoadOptions(trim_t_poses=True)).resampled(fps)
         composed = ComposedMotion(motion.poses, motion.poses, motion.contacts, [], fps, BLEND_S)
         fitted = replace(motion, poses=fit_feet(character, composed))
-        before, after = foot_skates(motion, character), foot_skates(fitted, character)
+        before, after = stance_slides(motion, character), stance_slides(fitted, character)
         assert np.median(before) > 0.01
         assert np.percentile(after, 99) < 0.01
         own, steps = joint_speeds(motion), joint_speeds(fitted)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character, default_character
-from dynresp.motion.feet.skating import TOUCH, foot_skates, foot_slides
+from dynresp.motion.feet.skating import TOUCH, foot_slides, stance_slides
 from dynresp.motion.feet.skating_kernel import least_slide, slides_kernel
 from dynresp.motion.ground import sole_points
 from dynresp.motion.motion import Motion
@@ -32,19 +32,19 @@ class TestFootSkates:
 
     def test_still_feet_do_not_slide(self, character: Character) -> None:
         motion = self._sliding(character, np.zeros((20, 2)), np.ones((20, 2)))
-        assert foot_skates(motion, character) == pytest.approx([0.0, 0.0])
+        assert stance_slides(motion, character) == pytest.approx([0.0, 0.0])
 
     def test_a_straight_slide_is_its_length(self, character: Character) -> None:
         path = np.outer(np.linspace(0.0, 0.5, 11), [0.6, 0.8])
         contacts = np.ones((11, 2))
-        assert foot_skates(self._sliding(character, path, contacts), character) == pytest.approx(
+        assert stance_slides(self._sliding(character, path, contacts), character) == pytest.approx(
             [0.5, 0.5]
         )
 
     def test_there_and_back_is_both_ways(self, character: Character) -> None:
         path = np.zeros((21, 2))
         path[:, 0] = np.abs(np.arange(21) - 10) * 0.01
-        slides = foot_skates(self._sliding(character, path, np.ones((21, 2))), character)
+        slides = stance_slides(self._sliding(character, path, np.ones((21, 2))), character)
         assert slides == pytest.approx([0.2, 0.2])
 
     def test_only_steps_between_standing_frames_count(self, character: Character) -> None:
@@ -52,14 +52,14 @@ class TestFootSkates:
         contacts = np.zeros((20, 2))
         contacts[2:6, 0] = contacts[10:18, 0] = 1
         contacts[5, 1] = 1  # one frame alone has no step
-        slides = foot_skates(self._sliding(character, path, contacts), character)
+        slides = stance_slides(self._sliding(character, path, contacts), character)
         assert slides == pytest.approx([0.03, 0.07])
 
     def test_a_stance_that_lasts_to_the_end_counts(self, character: Character) -> None:
         path = np.outer(np.arange(10), [0.0, 0.02])
         contacts = np.zeros((10, 2))
         contacts[4:, 1] = 1
-        slides = foot_skates(self._sliding(character, path, contacts), character)
+        slides = stance_slides(self._sliding(character, path, contacts), character)
         assert slides == pytest.approx([0.1])
 
     def test_rolling_over_the_heel_is_no_slide(self, character: Character) -> None:
@@ -78,7 +78,9 @@ class TestFootSkates:
             rows.append(origins[foot] + matrices[foot] @ heel)
         pinned = motion.poses.copy()
         pinned[:, :3] -= np.array(rows) - rows[0]
-        slides = foot_skates(Motion(pinned, FPS, contacts=np.array([[True, False]] * 8)), character)
+        slides = stance_slides(
+            Motion(pinned, FPS, contacts=np.array([[True, False]] * 8)), character
+        )
         assert slides == pytest.approx([0.0], abs=1e-9)
 
     @pytest.mark.parametrize("pivot", [(0.0, 0.0), (0.1, 0.03), (-0.05, -0.04)])
@@ -87,7 +89,7 @@ class TestFootSkates:
     ) -> None:
         poses = self._turning(character, "left", pivot)
         contacts = np.array([[True, False]] * len(poses))
-        assert foot_skates(Motion(poses, FPS, contacts=contacts), character) == pytest.approx(
+        assert stance_slides(Motion(poses, FPS, contacts=contacts), character) == pytest.approx(
             [0.0], abs=1e-9
         )
 
@@ -96,7 +98,7 @@ class TestFootSkates:
         poses = self._turning(character, "left", (0.035, 0.144))
         contacts = np.array([[True, False]] * len(poses))
         way = 0.1 * 2.0 * np.sin(0.05) * (len(poses) - 1)
-        skates = foot_skates(Motion(poses, FPS, contacts=contacts), character)
+        skates = stance_slides(Motion(poses, FPS, contacts=contacts), character)
         assert skates == pytest.approx([way], rel=1e-3)
 
     def _turning(self, character: Character, side: str, about: tuple[float, float]) -> FloatArray:

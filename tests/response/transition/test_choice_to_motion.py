@@ -5,7 +5,7 @@ import pytest
 
 from dynresp.motion.character import Character
 from dynresp.motion.feet import legs
-from dynresp.motion.feet.skating import foot_skates
+from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.choice import Choice
@@ -109,5 +109,5 @@ def test_a_stance_is_measured_over_both_seams(character: Character) -> None:
     simulated = _crouching(character, 1.0).poses[: LENGTH + 1]
     end = _ended(character, simulated, _crouching(character, 2.0, 0.15), "standing")
     contacts = np.ones((len(end.poses), len(FEET)), dtype=bool)
-    skates = foot_skates(Motion(end.poses, FPS, contacts=contacts), character)
+    skates = stance_slides(Motion(end.poses, FPS, contacts=contacts), character)
     assert max(skates) < 2e-3
