@@ -133,7 +133,7 @@ def crouched(character: Character, poses: FloatArray, depth: float = 0.08) -> Fl
 
 
 def standing_over(
-    character: Character, way: float, crouch: float = 0.08
+    character: Character, shift: float, crouch: float = 0.08
 ) -> tuple[ComposedMotion, FloatArray]:
     """Somebody who stands through a whole blend onto one who stands elsewhere, then lifts a foot.
 
@@ -142,11 +142,11 @@ def standing_over(
     """
     poses = crouched(character, standing(character, 4.0, FPS).poses, crouch)
     moved = poses.copy()
-    moved[:, 0] += way
+    moved[:, 0] += shift
     jump, blend = 40, 30
     left = 1.0 - rotations.ease((np.arange(len(poses)) - jump) / blend)
     played = moved.copy()
-    played[:, 0] -= way * left
+    played[:, 0] -= shift * left
     source = np.concatenate([poses[:jump], moved[jump:]])
     contacts = np.ones((len(poses), 2), dtype=bool)
     contacts[90:100, 0] = False
@@ -156,8 +156,8 @@ def standing_over(
     return replace(composed, contacts=contacts), foot_states(character, poses[:1])[0][0]
 
 
-def dragged(character: Character, way: float) -> ComposedMotion:
-    """Somebody who stands on one leg, then on the other, which two blends carry on by a way each.
+def dragged(character: Character, shift: float) -> ComposedMotion:
+    """Somebody who stands on one leg, then on the other, which two blends carry on by a shift each.
 
     The body stays; the second stance lasts 0.7 s, both blends reach beyond its end.
     """
@@ -170,8 +170,10 @@ def dragged(character: Character, way: float) -> ComposedMotion:
     jumps = [54, 62]
     for jump in jumps:
         since = np.arange(n) - jump
-        played[:, 0, 0] += way * (rotations.ease(since / blend) - rotations.ease((since - 30) / 20))
-        source[:, 0, 0] += way * ((since >= 0) - rotations.ease((since - 30) / 20))
+        played[:, 0, 0] += shift * (
+            rotations.ease(since / blend) - rotations.ease((since - 30) / 20)
+        )
+        source[:, 0, 0] += shift * ((since >= 0) - rotations.ease((since - 30) / 20))
     return ComposedMotion(
         legs.place_ankles(character, poses, played), legs.place_ankles(character, poses, source),
         contacts, jumps, FPS, blend / FPS,

@@ -151,8 +151,8 @@ def test_a_relative_skeleton_is_resolved(
         monkeypatch.chdir(tmp_path / name)
         motions.append(load_motion(amc, character, LoadOptions(asf=Path("a.asf"))))
     assert motions[0] is not motions[1]
-    told = LoadOptions(asf=tmp_path / "one" / "a.asf")
-    assert load_motion(amc, character, told) is motions[0]
+    options = LoadOptions(asf=tmp_path / "one" / "a.asf")
+    assert load_motion(amc, character, options) is motions[0]
     with pytest.raises(MotionFileError, match=r"gone\.asf"):
         load_motion(amc, character, LoadOptions(asf=Path("gone.asf")))
 

@@ -74,7 +74,7 @@ def place_hands(
         tracks: Of the left and of the right hand.
 
     Returns:
-        (frames, 59); where an arm is too short its hand is on the way to where it has to be.
+        (frames, 59); where an arm is too short its hand is on the line to its target.
     """
     if not any(track.weights.any() for track in tracks):
         return poses

@@ -48,7 +48,7 @@ def stance_slides(motion: Motion, character: Character) -> list[float]:
     """How far each foot slides in each of its stances [m].
 
     Summed over the steps between frames in both of which the foot stands (`motion.contacts`); first
-    the left foot's stances, then the right one's. One frame alone has no step and is no stance.
+    the left foot's stances, then the right one's. A single frame is not a stance.
     """
     slides = foot_slides(character, character.kinematics(motion.poses))
     sums: list[float] = []

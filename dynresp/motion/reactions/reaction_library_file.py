@@ -43,7 +43,7 @@ def _check_file(given: str) -> str:
         raise ValueError(str(error)) from None
     if PurePosixPath(file).suffix.lower() not in MOTION_SUFFIXES:
         raise ValueError(
-            f"{file!r} is no motion file; its name must end in {', '.join(MOTION_SUFFIXES)}"
+            f"{file!r} is not a motion file; its name must end in {', '.join(MOTION_SUFFIXES)}"
         )
     return file
 

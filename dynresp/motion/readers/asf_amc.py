@@ -154,7 +154,7 @@ class _AmcReader:
                 )
 
     def _begin_frame(self, word: bytes, line: int) -> None:
-        # Long runs of digits are no frame number, and slow to convert.
+        # Long runs of digits are not frame numbers, and slow to convert.
         index = int(word) if len(word) <= 9 else -1
         if self.frames and index != self._last + 1:
             raise file_error(

@@ -101,7 +101,7 @@ def _hierarchy(path: Path, text: str) -> list[_Joint]:
     """The joints of the part before MOTION, parents before children."""
     joints: list[_Joint] = []
     open_joints: list[int] = []
-    pending: int | None = None  # a joint named, whose brace has not come yet
+    pending: int | None = None  # a joint whose brace has not been read yet
     line = 0
     for line, row in enumerate(_NEW_LINE.split(text), start=1):
         for piece in filter(None, map(str.strip, _BRACES.split(row))):

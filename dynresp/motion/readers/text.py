@@ -51,7 +51,7 @@ def read_bounded(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
         limit: Largest size accepted [bytes].
 
     Raises:
-        MotionFileError: If it cannot be opened, is no regular file, is empty or above the limit.
+        MotionFileError: If it cannot be opened, is not a regular file, is empty or above the limit.
     """
     try:
         if not path.is_file():
@@ -88,7 +88,7 @@ def numbers(path: Path, tokens: Iterable[str], line: int, what: str) -> list[flo
         what: What they are, for the error.
 
     Raises:
-        MotionFileError: If a word is no such number.
+        MotionFileError: If a word is not such a number.
     """
     values = []
     for token in tokens:
@@ -135,7 +135,7 @@ def number_table(
         Array of that shape.
 
     Raises:
-        MotionFileError: If a word is no finite number of believable size, or there are more or
+        MotionFileError: If a word is not a finite number of believable size, or there are more or
             fewer numbers than `shape` says.
     """
     rows, columns = shape

@@ -134,8 +134,8 @@ def find_unit(
         raise file_error(
             path,
             f"the unit is not clear: from hips to hands or feet the skeleton measures {reach:g}, "
-            "which is no person in metres, centimetres, inches or millimetres; give the unit "
-            "(metres per file unit)",
+            "which is not a person's size in metres, centimetres, inches or millimetres; give the "
+            "unit (metres per file unit)",
         )
     return UNITS[nearest]
 

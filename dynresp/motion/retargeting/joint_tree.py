@@ -131,7 +131,7 @@ def _alike(a: _Limb, b: _Limb) -> bool:
 
 
 def _forward(points: FloatArray, legs: tuple[_Limb, _Limb]) -> FloatArray:
-    """Where the feet point, or the knees if there are no toes, on the ground, (frames, 2) [m]."""
+    """Direction of the feet, or of the knees without toes, on the ground, (frames, 2) [m]."""
     toes = [(points[:, leg.tip] - points[:, leg.joints[2]])[:, :2] for leg in legs]
     forward = np.sum(toes, axis=0)
     if np.median(np.linalg.norm(forward, axis=1)) > 2.0 * _FOOT:

@@ -105,12 +105,12 @@ def test_whoever_has_fallen_gets_up_by_graph(character: Character) -> None:
 
 def test_wrong_props_are_refused(tmp_path: Path) -> None:
     text = (builtin_folder() / "get_up_prone.toml").read_text()
-    for old, new, said in (
+    for old, new, message in (
         ('hand = "left"', 'hand = "both"', "prop 1.hand"),
         ("at = [0.27, 0.30]", "at = [0.27]", "prop 1.at"),
         ("to = 1.66", "to = 9.0", "left hand: 'to' is 9 s"),
     ):
         file = tmp_path / "wrong.toml"
         file.write_text(text.replace(old, new, 1))
-        with pytest.raises(SpecError, match=said):
+        with pytest.raises(SpecError, match=message):
             read_spec(file)

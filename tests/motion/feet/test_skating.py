@@ -23,7 +23,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class TestFootSkates:
-    """The way of standing feet over the ground."""
+    """How far standing feet slide over the ground."""
 
     def _sliding(self, character: Character, path: FloatArray, contacts: FloatArray) -> Motion:
         poses = turned(character, {}, len(path))
@@ -94,7 +94,7 @@ class TestFootSkates:
         )
 
     def test_turning_about_a_point_beside_the_sole_is_one(self, character: Character) -> None:
-        """By the way of the nearest point of the sole."""
+        """As far as the nearest point of the sole does."""
         poses = self._turning(character, "left", (0.035, 0.144))
         contacts = np.array([[True, False]] * len(poses))
         way = 0.1 * 2.0 * np.sin(0.05) * (len(poses) - 1)

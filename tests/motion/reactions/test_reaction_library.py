@@ -96,7 +96,7 @@ def test_identity_tells_libraries_apart(character: Character, folder: Path) -> N
         ("upper_body_front", "faint", "reaction.strategy: expected 'step_forward_small', "),
         ('file = "a/b.npz"\n', "", "file is missing; give file and frames, or builtin"),
         ("a/b.npz", "../b.npz", "'../b.npz' is not a path inside a motions folder"),
-        ("a/b.npz", "a/b.png", "'a/b.png' is no motion file; its name must end in .amc"),
+        ("a/b.npz", "a/b.png", "'a/b.png' is not a motion file; its name must end in .amc"),
         ("frames = [10, 30]\n", "", "frames is missing; expected [first, one past the last]"),
         ("[10, 30]", "[30, 10]", "got [30, 10]"),
         ("[10, 30]", "[10, 11]", "at least two"),

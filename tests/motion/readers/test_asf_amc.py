@@ -15,7 +15,7 @@ CMU_UNIT = 0.0254 / 0.45
 
 
 def assert_equals_twin(motion: SkeletonMotion, asf: Path, amc: Path, every: int = 1) -> None:
-    """The motion, told unit 1 and Z up, against the slow twin."""
+    """The motion, given unit 1 and Z up, against the slow twin."""
     positions = motion.joint_positions()
     for index, places in list(enumerate(bone_starts(asf, amc)))[::every]:
         assert set(places) == set(motion.names)

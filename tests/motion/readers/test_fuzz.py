@@ -45,7 +45,7 @@ class Format:
         name: Names the test.
         seeds: Sound files, small.
         real: Sound files below the folder of real motion, read where it is there.
-        read: Reads a file; also told the folder in which it lies, which `prepare` filled.
+        read: Reads a file; also gets its folder, which `prepare` filled.
         prepare: Puts into that folder what reading needs besides the file.
     """
 

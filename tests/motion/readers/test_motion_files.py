@@ -239,7 +239,7 @@ def manifest() -> list[dict[str, str]]:
 @pytest.mark.mocap
 @pytest.mark.skipif(not MOTIONS, reason="DYNRESP_MOTIONS names no folder of motion capture")
 def test_every_clip_of_the_manifest() -> None:
-    """Frames, rate, unit and up axis are found as the manifest tells them, with nothing given."""
+    """Frames, rate, unit and up axis are found as the manifest states them, with nothing given."""
     wrong = []
     for row in manifest():
         motion = read_motion_file(Path(MOTIONS, row["file"]))

@@ -263,15 +263,15 @@ class TestBounds:
         assert self.peak(bomb, "is not what") < 2**20
 
     @pytest.mark.parametrize(
-        ("told", "said"), [(2**26, "which is not what"), (2**31, "unpacks to 2048.0 MiB")]
+        ("stated", "message"), [(2**26, "which is not what"), (2**31, "unpacks to 2048.0 MiB")]
     )
-    def test_sizes_of_which_the_directory_lies(self, file: Path, told: int, said: str) -> None:
+    def test_wrong_sizes_in_the_directory(self, file: Path, stated: int, message: str) -> None:
         # The directory says 64 MiB or 2 GiB; the member has a few bytes.
         data = bytearray(file.read_bytes())
         entry = data.rindex(b"PK\x01\x02", 0, data.rindex(b"poses.npy"))
-        data[entry + 24 : entry + 28] = struct.pack("<L", told)
+        data[entry + 24 : entry + 28] = struct.pack("<L", stated)
         file.write_bytes(data)
-        assert self.peak(file, said) < 2**20
+        assert self.peak(file, message) < 2**20
 
     def test_an_archive_of_very_many_files(self, file: Path) -> None:
         with zipfile.ZipFile(file, "a") as archive:

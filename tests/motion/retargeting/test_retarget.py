@@ -64,7 +64,7 @@ class TestSources:
         assert max(worst_directions(character, walk.poses, found.poses).values()) < 3.5
         facing = worst_directions(character, walk.poses, found.poses, FORWARD)
         assert max(facing.values()) < 6.0
-        # Thighs and shanks of other proportions lengthen the way, but not the height.
+        # Thighs and shanks of other proportions lengthen the path, but not the height.
         way = np.linalg.norm(walk.root_positions[-1] - walk.root_positions[0])
         assert farthest(walk, found) < 0.01 + 0.02 * way
         feet = [character.body(f"{side}_foot") for side in FEET]
@@ -82,7 +82,7 @@ class TestSources:
         made = load_builtin(motion, character)
         source = SOURCES[name]
         path = write_source(source, put_on(source, made, character), tmp_path / "a.bvh")
-        # A roll has no side up, so the axis is told.
+        # In a roll no side stays up, so the axis is given.
         found = retarget(read_bvh(path, up=source.up), character)
         worst = worst_directions(character, made.poses, found.poses)
         assert max(worst.values()) < 10.0, worst

@@ -1,4 +1,4 @@
-"""Fetching against a real server on this machine that can be told to misbehave."""
+"""Fetching against a real server on this machine that can misbehave on purpose."""
 
 import errno
 import hashlib
