@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from dynresp.avatar_runs.graph_building import build_graph as build_from_spec
-from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, read_graph_spec
 from dynresp.experiments.experiment_reader import read_experiment
 from dynresp.experiments.one_hit import HitResponse
 from dynresp.experiments.runner import HitResult, Run, prepare_run, write_results
@@ -78,9 +78,11 @@ def build_graph(
         MissingMotionDataError: Its motions are not on this machine.
         SpecError: The file is wrong.
     """
-    path = find_plan(str(spec))
+    path = find_graph_spec(str(spec))
     folders = motion_folders(None if motions is None else Path(motions))
-    return build_from_spec(read_plan(path), folders, path.parent, default_character(), progress)
+    return build_from_spec(
+        read_graph_spec(path), folders, path.parent, default_character(), progress
+    )
 
 
 @dataclass(frozen=True, eq=False)

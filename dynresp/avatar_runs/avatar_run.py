@@ -1,4 +1,4 @@
-"""An avatar's way through a graph, written for people to see and for programs to go on with."""
+"""What an avatar did on a motion graph, and the result folder that is written of it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.avatar_runs.world_setup import standing_about
+from dynresp.avatar_runs.world_setup import standing_objects
 from dynresp.locomotion.graph.graph_file import graph_identity
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.composition import Composition
@@ -21,38 +21,43 @@ from dynresp.response.response_quality import joint_speed_steps
 from dynresp.results.result_folder import PLAN, RESULT, WRITTEN, clear_response
 from dynresp.results.result_json import versions, write_json
 from dynresp.results.story_files import Writer, story_writers, write_files
-from dynresp.support.progress import Progress
+from dynresp.support.progress import Progress, no_progress
 from dynresp.view.story import Block, GroundPath, MovingSphere, Story, StoryEvent, StoryPhase
 
-FILES = ("motion.npz", "motion.bvh", "recording.html", "filmstrip.png", PLAN, "video.mp4")
-"""What is written of an outing besides `result.json`."""
+VIDEO = "video.mp4"
+FILES = ("motion.npz", "motion.bvh", "recording.html", "filmstrip.png", PLAN, VIDEO)
+"""What is written of every run besides `result.json`."""
 
-# A stance of a walk lasts half a second: with fewer frames a second hardly any has two steps [1/s].
-_SKATE_FPS = 10.0
+# A stance of a walk lasts half a second: below this frame rate hardly any has two steps [1/s].
+_MIN_SLIDE_FPS = 10.0
 _VIDEO_PX, _VIDEO_FPS = (640, 480), 30.0
 
 
 @dataclass(frozen=True, eq=False)
-class Outing:
+class AvatarRun:
     """What an avatar did.
 
     Attributes:
+        graph: The motion graph that it walked through.
+        character: Its body.
         title: First line of the pictures.
         subtitle: Second line.
         motion: Its motion.
-        jumps_s: When it jumped in the graph [s]; None where that is not known.
-        sliding: The motion before its feet were fitted; None where that is not known.
-        blocks: What stood about.
-        paths: What was drawn on the ground.
-        bounds: How far it could go, (x, y, x, y) of two corners [m]; None where there is no bound.
+        jumps_s: Times of its jumps in the graph [s]; None if they are not known.
+        sliding: The motion before its feet were fitted; None if it is not known.
+        blocks: Boxes around it.
+        paths: Lines drawn on the ground.
+        bounds: Where it had to stay, (x, y, x, y) of two corners [m]; None for everywhere.
         spheres: Balls.
-        events: Moments with names.
+        events: Named moments.
         phases: What drove the avatar when.
-        arrived: Whether it came as far as asked.
+        arrived: Whether it reached its goal or the end of its path.
         about: Further content of `result.json`.
-        writers: What writes further files, by name.
+        writers: What writes further files, by file name.
     """
 
+    graph: MotionGraph
+    character: Character
     title: str
     subtitle: str
     motion: Motion
@@ -69,82 +74,82 @@ class Outing:
     writers: dict[str, Writer] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, composition: Composition, graph: MotionGraph, **rest: Any) -> Outing:
-        """The outing of a walk that was composed as a whole; the rest as the class takes it."""
+    def of(
+        cls, composition: Composition, graph: MotionGraph, character: Character, **rest: Any
+    ) -> AvatarRun:
+        """The run of a walk that was composed as a whole; `rest` are further attributes."""
         motion = composition.motion
         jumps_s = (composition.jumps / graph.config.fps).tolist()
         sliding = replace(motion, poses=composition.unfitted)
-        return cls(motion=motion, jumps_s=jumps_s, sliding=sliding, **rest)
+        return cls(graph, character, motion=motion, jumps_s=jumps_s, sliding=sliding, **rest)
+
+    def save(
+        self, folder: Path | str, progress: Progress = no_progress, video: bool = True
+    ) -> dict[str, Any]:
+        """Write the result folder.
+
+        Args:
+            folder: Where to; made if it is missing. Files that an earlier run wrote there, and
+                this one does not, are removed.
+            progress: Called with the stage, how many steps are done, and of how many.
+            video: Whether a video is drawn.
+
+        Returns:
+            The content of `result.json`. Its `files` says of each file whether it was written, and
+            if not, why.
+
+        Raises:
+            DynrespError: `result.json` cannot be written.
+        """
+        folder = Path(folder)
+        story = self._story()
+
+        def plan(path: Path) -> None:
+            from dynresp.view.ground_plan import write_ground_plan
+
+            jumps_s = [at for at in self.jumps_s or () if at <= story.duration]
+            write_ground_plan(story, path, jumps_s)
+
+        writers = {
+            **story_writers(story, self.character, _VIDEO_PX, _VIDEO_FPS, progress),
+            PLAN: plan,
+            **self.writers,
+        }
+        names = [name for name in FILES if video or name != VIDEO]
+        names += list(self.writers)
+        files = write_files(folder, names, writers, progress)
+        written = [name for name, what in files.items() if what == WRITTEN]
+        not_removed = clear_response(folder, [RESULT, *written])
+        files |= {name: what for name, what in not_removed.items() if name not in files}
+        content = {
+            "title": self.title,
+            "graph": graph_summary(self.graph),
+            "happened": run_metrics(self),
+            **self.about,
+            "files": files,
+            "versions": versions(),
+        }
+        write_json(content, folder / RESULT)
+        return content
+
+    def _story(self) -> Story:
+        """What the pictures show."""
+        standing, bars = standing_objects(self.graph.database.world, len(self.motion))
+        return Story(
+            motion=self.motion,
+            spheres=self.spheres,
+            events=self.events,
+            phases=self.phases,
+            blocks=[*self.blocks, *standing],
+            capsules=bars,
+            paths=self.paths,
+            bounds=self.bounds,
+            title=self.title,
+            subtitle=self.subtitle,
+        )
 
 
-def write_outing(
-    folder: Path,
-    graph: MotionGraph,
-    outing: Outing,
-    character: Character,
-    progress: Progress,
-    video: bool = True,
-) -> dict[str, Any]:
-    """Write an outing to a folder.
-
-    Args:
-        folder: Where to; made if it is missing. What an earlier run left there under the same names
-            is removed where it is not written anew.
-        graph: What it went through.
-        outing: What the avatar did.
-        character: Whose body it has.
-        progress: Told the stage, how many are done, and of how many.
-        video: Whether a video is drawn.
-
-    Returns:
-        The content of `result.json`; under `files` it says what was written, and why not.
-
-    Raises:
-        DynrespError: `result.json` cannot be written.
-    """
-    standing, bars = standing_about(graph.database.world, len(outing.motion))
-    story = Story(
-        motion=outing.motion,
-        spheres=outing.spheres,
-        events=outing.events,
-        phases=outing.phases,
-        blocks=[*outing.blocks, *standing],
-        capsules=bars,
-        paths=outing.paths,
-        bounds=outing.bounds,
-        title=outing.title,
-        subtitle=outing.subtitle,
-    )
-
-    def plan(path: Path) -> None:
-        from dynresp.view.ground_plan import write_ground_plan
-
-        write_ground_plan(story, path, [at for at in outing.jumps_s or () if at <= story.duration])
-
-    writers = {
-        **story_writers(story, character, _VIDEO_PX, _VIDEO_FPS, progress),
-        PLAN: plan,
-        **outing.writers,
-    }
-    names = [name for name in FILES if video or name != "video.mp4"]
-    names += list(outing.writers)
-    files = write_files(folder, names, writers, progress)
-    there = [name for name, what in files.items() if what == WRITTEN]
-    left = clear_response(folder, [RESULT, *there])
-    files |= {name: what for name, what in left.items() if name not in files}
-    content = {
-        "title": outing.title,
-        "graph": about_graph(graph),
-        "happened": figures(outing, character),
-        **outing.about,
-        "files": files,
-        "versions": versions(),
-    }
-    write_json(content, folder / RESULT)
-    return content
-
-
-def about_graph(graph: MotionGraph) -> dict[str, Any]:
+def graph_summary(graph: MotionGraph) -> dict[str, Any]:
     """What `result.json` says of a graph."""
     clips = graph.database.clips
     return {
@@ -158,35 +163,38 @@ def about_graph(graph: MotionGraph) -> dict[str, Any]:
     }
 
 
-def figures(outing: Outing, character: Character) -> dict[str, Any]:
-    """What came of an outing, in numbers; slides as blended, if known, and with feet fitted."""
-    motion = outing.motion
-    track = motion.root_positions[:, :2]
-    way = float(np.linalg.norm(np.diff(track, axis=0), axis=1).sum())
-    steps = joint_speed_steps(motion)
-    said: dict[str, Any] = {
-        "seconds": motion.duration,
-        "way_m": way,
-        "speed_m_s": way / motion.duration if motion.duration > 0 else 0.0,
-        "jumps": None if outing.jumps_s is None else len(outing.jumps_s),
-        "joint_speed_step_99_rad_s": float(np.percentile(steps, 99.0)) if steps.size else 0.0,
-        "foot_skate_m": skate(motion, character),
-    }
-    if outing.sliding is not None:
-        said["foot_skate_as_blended_m"] = skate(outing.sliding, character)
-    return said
+def run_metrics(run: AvatarRun) -> dict[str, Any]:
+    """What `result.json` says of a run in numbers.
 
-
-def skate(motion: Motion, character: Character) -> dict[str, float] | None:
-    """How far feet slide a stance [m]: `median`, `percentile_95`, `worst`; 0 without a stance.
-
-    None of a motion with too few frames a second to tell.
+    Foot slide is given of the motion and, if it is known, of the motion before feet were fitted.
     """
-    if motion.fps < _SKATE_FPS:
+    motion = run.motion
+    track = motion.root_positions[:, :2]
+    distance = float(np.linalg.norm(np.diff(track, axis=0), axis=1).sum())
+    steps = joint_speed_steps(motion)
+    metrics: dict[str, Any] = {
+        "seconds": motion.duration,
+        "way_m": distance,
+        "speed_m_s": distance / motion.duration if motion.duration > 0 else 0.0,
+        "jumps": None if run.jumps_s is None else len(run.jumps_s),
+        "joint_speed_step_99_rad_s": float(np.percentile(steps, 99.0)) if steps.size else 0.0,
+        "foot_skate_m": foot_slide(motion, run.character),
+    }
+    if run.sliding is not None:
+        metrics["foot_skate_as_blended_m"] = foot_slide(run.sliding, run.character)
+    return metrics
+
+
+def foot_slide(motion: Motion, character: Character) -> dict[str, float] | None:
+    """How far feet slide in a stance [m]: `median`, `percentile_95`, `worst`; 0 without a stance.
+
+    None if the motion has less than 10 frames a second: too few to tell.
+    """
+    if motion.fps < _MIN_SLIDE_FPS:
         return None
-    slips = stance_slides(motion, character) or [0.0]
+    slides = stance_slides(motion, character) or [0.0]
     return {
-        "median": float(np.median(slips)),
-        "percentile_95": float(np.percentile(slips, 95.0)),
-        "worst": float(np.max(slips)),
+        "median": float(np.median(slides)),
+        "percentile_95": float(np.percentile(slides, 95.0)),
+        "worst": float(np.max(slides)),
     }

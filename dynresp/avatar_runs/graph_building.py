@@ -1,4 +1,4 @@
-"""From a plan to a graph: finding, loading and cutting its motions, and their contacts."""
+"""Building the graph of a spec: find, load and cut its motions, and find their contacts."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 
-from dynresp.avatar_runs.graph_spec import GraphPlan
-from dynresp.avatar_runs.world_setup import lay_out
+from dynresp.avatar_runs.graph_spec import GraphSpec
+from dynresp.avatar_runs.world_setup import place_in_world
 from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import builtin_names
@@ -26,35 +26,36 @@ from dynresp.specs.shared_tables import MotionCut
 from dynresp.support.errors import MissingMotionDataError, SpecError
 from dynresp.support.progress import Progress
 
-_NAMED_MISSING = 5
+# Most names of missing files in a message.
+_MAX_NAMED = 5
 
 
 def build_graph(
-    plan: GraphPlan,
+    spec: GraphSpec,
     folders: Sequence[Path],
     beside: Path,
     character: Character,
     progress: Progress,
     threads: int = 0,
 ) -> MotionGraph:
-    """Build the graph of a plan.
+    """Build the graph of a spec.
 
     Args:
-        plan: What it is made of.
+        spec: The spec.
         folders: Motions folders.
-        beside: Folder of the plan's file, from which relative paths count first.
+        beside: Folder of the spec's file; relative paths are looked up there first.
         character: The character.
-        progress: Told the stage, how many are done, and of how many.
+        progress: Called with the stage, how many steps are done, and of how many.
         threads: Threads, 0 for all cores.
 
     Raises:
         MissingMotionDataError: Motion files are not on this machine.
         SpecError: A name with wildcards leads out of the folders, or stands for built-in motion; or
-            `leave_out` names what the plan does not hold.
-        DynrespError: A file cannot be read, or there is no graph of what it holds.
+            `leave_out` names a motion that the spec does not have.
+        DynrespError: A file cannot be read, or its motions make no graph.
     """
-    spelled = [cut for given in plan.motion for cut in _spelled_out(given, folders, beside)]
-    cuts = _taken(spelled, plan.leave_out)
+    expanded = [cut for given in spec.motion for cut in _expand(given, folders, beside)]
+    cuts = _without(expanded, spec.leave_out)
     found = [find_motion(cut.motion, folders, beside) for cut in cuts]
     _refuse_missing([c.motion for c, f in zip(cuts, found, strict=True) if f is None], folders)
     motions: list[Motion] = []
@@ -67,26 +68,26 @@ def build_graph(
         if "credit" in about:
             owed[about["credit"]] = None
     progress("finding contacts", 0, 1)
-    laid = lay_out(plan.graph.world, motions, character)
+    placed = place_in_world(spec.graph.world, motions, character)
     progress("comparing frames", 0, 1)
-    config = plan.graph.config()
+    config = spec.graph.config()
     database = MotionDatabase.from_motions(
-        laid.motions, character, config.fps, config.mirrored, laid.contacts, tuple(owed)
+        placed.motions, character, config.fps, config.mirrored, placed.contacts, tuple(owed)
     )
-    database = replace(database, world=plan.graph.world)
+    database = replace(database, world=spec.graph.world)
     return MotionGraph.from_database(database, config, character, threads)
 
 
-def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:
-    """A table for each file that a name with wildcards stands for; else the table itself."""
+def _expand(given: MotionCut, folders: Sequence[Path], beside: Path) -> list[MotionCut]:
+    """A table for each file that a name with wildcards stands for; otherwise the table itself."""
     if not _has_wildcards(given.motion):
         return [given]
     if given.motion.startswith(BUILTIN_PREFIX):
         raise SpecError(
             f"motion: {given.motion!r} has wildcards, and built-in motions are named one by one, "
-            f"in a [[motion]] each; there are {', '.join(builtin_names())}"
+            f"each in its own [[motion]]; there are {', '.join(builtin_names())}"
         )
-    # A plan may lie in a home folder: only what the name spells out is looked through.
+    # A spec may be in a home folder: look only into the folders that the name spells out.
     parts = PurePosixPath(checked_relative_path(given.motion)).parts
     fixed = list(takewhile(lambda part: not _has_wildcards(part), parts[:-1]))
     for folder in (beside, *folders):
@@ -102,21 +103,21 @@ def _spelled_out(given: MotionCut, folders: Sequence[Path], beside: Path) -> lis
     return []
 
 
-def _taken(spelled: list[MotionCut], leave_out: Sequence[str]) -> list[MotionCut]:
-    """The tables but for what is left out."""
-    named = {cut.motion for cut in spelled}
+def _without(cuts: list[MotionCut], leave_out: Sequence[str]) -> list[MotionCut]:
+    """The tables without those that `leave_out` names."""
+    named = {cut.motion for cut in cuts}
     for name in leave_out:
         if name not in named:
             close = difflib.get_close_matches(name, named, n=3, cutoff=0.3)
             meant = f"; the nearest are {', '.join(close)}" if close else ""
             raise SpecError(
-                f"leave_out: {name!r} is none of the {len(named)} motions that the [[motion]] "
-                f"tables stand for{meant}"
+                f"leave_out: {name!r} is not one of the {len(named)} motions that the [[motion]] "
+                f"tables name{meant}"
             )
-    taken = [cut for cut in spelled if cut.motion not in leave_out]
-    if not taken:
-        raise SpecError("leave_out names all motions of the plan; leave some of them in")
-    return taken
+    kept = [cut for cut in cuts if cut.motion not in leave_out]
+    if not kept:
+        raise SpecError("leave_out names all motions of the spec; keep some of them")
+    return kept
 
 
 def _has_wildcards(name: str) -> bool:
@@ -127,10 +128,10 @@ def _refuse_missing(names: list[str], folders: Sequence[Path]) -> None:
     if not names:
         return
     looked = ", ".join(str(folder) for folder in folders) or "no folder: none is known"
-    more = len(names) - _NAMED_MISSING
-    told = ", ".join(names[:_NAMED_MISSING]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - _MAX_NAMED
+    missing = ", ".join(names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
     raise MissingMotionDataError(
-        f"the graph needs motion files that are not on this machine: {told} (looked in {looked}); "
-        "name a folder that holds them with --motions or DYNRESP_MOTIONS, or build the graph of "
-        "built-in motion with `dynresp graph build builtin`."
+        f"the graph needs motion files that are not on this machine: {missing} (looked in "
+        f"{looked}); name a folder that holds them with --motions or DYNRESP_MOTIONS, or build "
+        "the graph of built-in motion with `dynresp graph build builtin`."
     )

@@ -1,4 +1,4 @@
-"""What a graph plan says: which motions, and how a graph is made of them (`docs/locomotion.md`)."""
+"""Graph specs: which motions a graph is made of, and its settings (`docs/locomotion.md`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dynresp.support.errors import SpecError, UnknownNameError, UsageError
 from dynresp.support.paths import example_specs
 
 WorldName = Literal["flat", "terrain", "stool", "playground"]
-"""Where the motions were recorded; it says what counts as a contact."""
+"""The world of the motions; it says what counts as a contact."""
 
 
 _COORDINATES: dict[str, str] = {
@@ -64,10 +64,10 @@ class GraphTable(Strict):
         return GraphConfig(**said)
 
 
-class GraphPlan(Strict):
-    """A whole plan.
+class GraphSpec(Strict):
+    """A whole spec.
 
-    Motions under `leave_out` are not taken although a name with wildcards stands for them.
+    `leave_out` names motions that are left out although a name with wildcards stands for them.
     """
 
     graph: GraphTable
@@ -78,41 +78,41 @@ class GraphPlan(Strict):
 _HINTS = Hints(
     missing={
         "graph": "add [graph] with name",
-        "name": "say in a few words what the graph is of",
+        "name": "say in a few words what is in the graph",
         "motion": 'add [[motion]] with motion = "builtin:walk", a path inside a motions folder, or '
         "one with * for several files",
     },
 )
 
 
-def plans_folder() -> Path:
-    """Folder of the plans that come with dynresp."""
+def graph_specs_folder() -> Path:
+    """Folder of the specs that come with dynresp."""
     return example_specs(GRAPHS)
 
 
-def plan_names() -> tuple[str, ...]:
-    """Names of the plans that come with dynresp, sorted."""
-    return tuple(sorted(file.stem for file in plans_folder().glob("*.toml")))
+def graph_spec_names() -> tuple[str, ...]:
+    """Names of the specs that come with dynresp, sorted."""
+    return tuple(sorted(file.stem for file in graph_specs_folder().glob("*.toml")))
 
 
-def find_plan(given: str) -> Path:
-    """The file of a plan.
+def find_graph_spec(given: str) -> Path:
+    """The file of a spec.
 
     Args:
         given: The name of one that comes with dynresp, or a file (.toml).
 
     Raises:
-        UnknownNameError: There is none of that name.
+        UnknownNameError: No spec has that name.
     """
     if given.endswith(".toml"):
         return Path(given)
-    if given not in plan_names():
-        raise UnknownNameError("graph plan", given, [*plan_names(), "a plan file (.toml)"])
-    return plans_folder() / f"{given}.toml"
+    if given not in graph_spec_names():
+        raise UnknownNameError("graph spec", given, [*graph_spec_names(), "a spec file (.toml)"])
+    return graph_specs_folder() / f"{given}.toml"
 
 
-def read_plan(path: Path | str) -> GraphPlan:
-    """Read a graph plan.
+def read_graph_spec(path: Path | str) -> GraphSpec:
+    """Read a graph spec.
 
     Args:
         path: A TOML file.
@@ -124,9 +124,9 @@ def read_plan(path: Path | str) -> GraphPlan:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    plan = read_spec(GraphPlan, Path(path), "a graph plan", _HINTS)
+    spec = read_spec(GraphSpec, Path(path), "a graph spec", _HINTS)
     try:
-        plan.graph.config()
+        spec.graph.config()
     except UsageError as error:
         raise SpecError(f"{path}: [graph]: {error}") from None
-    return plan
+    return spec

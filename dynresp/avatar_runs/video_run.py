@@ -1,4 +1,4 @@
-"""An outing that follows somebody in a video (Lee et al. 2002, section 5.3)."""
+"""A walk that follows a person in a video (Lee et al. 2002, section 5.3)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.avatar_runs.avatar_run import Outing
-from dynresp.avatar_runs.visible_cluster_file import Sight
+from dynresp.avatar_runs.avatar_run import AvatarRun
+from dynresp.avatar_runs.visible_cluster_file import VideoModel
 from dynresp.avatar_runs.world_setup import TERRAIN, play_in_world
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import wrapped
@@ -33,30 +33,29 @@ from dynresp.view.video_control_view import (
     write_video_control,
 )
 
-# A video must go on for so long after the empty room [s].
-_LEAST_S = 0.5
-# So many pictures fewer than a file says are no damage: some count what cannot be shown.
-_FEW = 5
-# Mean speeds below count as standing [m/s].
-_STANDING = 0.25
-# Turns below count as none [deg/s].
-_STRAIGHT = 10.0
-# So many moments are kept for the picture, or up to twice as many.
+# Shortest video after the empty room [s].
+_MIN_S = 0.5
+# A file may hold this many pictures fewer than it says: some files count pictures that cannot be
+# shown.
+_TOLERATED = 5
+# A slower mean speed counts as standing [m/s], a slower turn as none [deg/s].
+_STANDING_M_S, _STRAIGHT_DEG_S = 0.25, 10.0
+# Moments kept for the picture: from this many to twice as many.
 _KEPT = 32
 
 
 @dataclass(frozen=True)
-class VideoAsked:
-    """What is to be watched.
+class VideoSettings:
+    """A video, and how long to follow it.
 
     Attributes:
-        name: Of the video, for people.
+        name: Name of the video, for people.
         fps: Pictures a second.
-        seconds: Watch at most so long [s].
-        length: Pictures it has; None where that is not known.
-        seed: Of where the avatar begins, and of what it does while it sees nobody.
-        stop: Whether to stop; asked before each picture, once there is something to follow.
-        ended: Told when no more pictures are waited for.
+        seconds: Longest time to follow [s].
+        length: Number of pictures; None if it is not known.
+        seed: Seed of where the avatar begins, and of what it does while it sees nobody.
+        stop: Whether to stop; called before each picture, once there is something to follow.
+        ended: Called when no more pictures are awaited.
     """
 
     name: str
@@ -70,13 +69,13 @@ class VideoAsked:
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast was chosen.
+    """How fast the computer chose.
 
     Attributes:
-        choices: How many.
-        choices_per_s: For each second of computing; ten are due in a second of video.
-        share_of_real_time: Computing time for a second of video [s].
-        slowest_choice_s: The longest time from a choice to the next [s].
+        choices: Number of choices.
+        choices_per_s: Choices per second of computing; a second of video needs ten.
+        share_of_real_time: Computing time per second of video [s].
+        slowest_choice_s: The longest time between two choices [s].
     """
 
     choices: int
@@ -86,148 +85,150 @@ class Pace:
 
 
 def check_watchable(graph: MotionGraph) -> None:
-    """Refuse a graph that cannot be gone through by video.
+    """Refuse a graph that cannot follow a video.
 
     Raises:
-        UsageError: It is of steps that fit onto blocks only.
+        UsageError: Its steps fit on blocks only.
     """
     if graph.database.world == TERRAIN:
         raise UsageError(
-            "the graph holds steps over rough terrain, each of which needs its blocks, and a video "
-            "does not show them; build another graph, or use `dynresp graph sketch`"
+            "the graph holds steps over rough terrain, which need blocks to step on, and a video "
+            "shows none; build another graph, or use `dynresp graph sketch`"
         )
 
 
-def watch_outing(
+def video_run(
     graph: MotionGraph,
     character: Character,
-    sight: Sight,
+    model: VideoModel,
     pictures: Iterable[Picture],
-    asked: VideoAsked,
+    settings: VideoSettings,
     fps: float,
     progress: Progress,
     remark: Callable[[str], None],
-) -> tuple[Outing, Pace]:
-    """Follow somebody.
+) -> tuple[AvatarRun, Pace]:
+    """Follow a person in a video; `dynresp graph watch` does this.
 
     Args:
-        graph: What is walked through.
-        character: Whose body the avatar has.
-        sight: Of the graph.
-        pictures: Of the video; the first second shows the room alone.
-        asked: What is watched.
+        graph: The motion graph.
+        character: The avatar's body.
+        model: What was learnt of the graph.
+        pictures: Pictures of the video; the first second shows the empty room.
+        settings: The video, and how long to follow it.
         fps: Frame rate of the motion [1/s].
-        progress: Told how far it has come.
-        remark: Told of a video that ends before it should.
+        progress: Called with the stage, how many pictures are done, and of how many.
+        remark: Called with a message if the video ends early.
 
     Raises:
         MotionFileError: The video is too short.
         MotionError: Its pictures are not all of one size.
-        DynrespError: Nobody is ever seen.
+        DynrespError: No person is ever seen.
     """
-    rng = np.random.default_rng(asked.seed)
+    rng = np.random.default_rng(settings.seed)
     start = int(rng.choice(graph.frames))
-    _compiled(sight, start)
-    control = VideoControl(sight.forest, sight.table, sight.recogniser)
-    reel = _Reel(pictures, asked, progress)
+    _compile(model, start)
+    control = VideoControl(model.forest, model.table, model.recogniser)
+    reel = _Reel(pictures, settings, progress)
     steps: list[Followed] = []
     slowest = 0.0
     begun = before = time.perf_counter()
-    for step in follow(reel, asked.fps, control, start, rng):
+    for step in follow(reel, settings.fps, control, start, rng):
         reel.keep(step)
-        # Masks are large, and those that are shown are kept by the reel.
+        # Masks are large; the reel keeps those that are shown.
         steps.append(Followed(step.time_s, step.frames, step.cluster, step.told, None))
         now = time.perf_counter()
         slowest = max(slowest, now - before - reel.waited_since())
         before = now
     worked = time.perf_counter() - begun - reel.waited_s
-    missing = _missing(asked, reel.count)
-    _check_length(asked, reel.count, missing)
+    missing = _missing(settings, reel.count)
+    _check_length(settings, reel.count, missing)
     if missing:
-        remark(f"{asked.name}: {missing}")
+        remark(f"{settings.name}: {missing}")
     if not any(step.told is not None for step in steps):
         raise DynrespError(
-            f"nobody is seen in {asked.name}, {steps[-1].time_s:.1f} s; the first second has to "
-            "show the room alone, the camera must stand still, and whole people be seen in clothes "
-            "unlike the room"
+            f"no person is seen in {settings.name}, {steps[-1].time_s:.1f} s; the first second "
+            "must show the empty room, the camera must not move, and the whole person must be in "
+            "the picture, in clothes unlike the room"
         )
     pace = Pace(
-        len(steps), len(steps) / worked, worked / (reel.count / asked.fps), max(slowest, 0.0)
+        len(steps), len(steps) / worked, worked / (reel.count / settings.fps), max(slowest, 0.0)
     )
-    return _outing(graph, character, sight, start, steps, reel, asked, fps), pace
+    return _run(graph, character, model, start, steps, reel, settings, fps), pace
 
 
-def _compiled(sight: Sight, start: int) -> None:
-    """Choose once for nobody: what is compiled on first use would keep the person waiting."""
-    trial = VideoControl(sight.forest, sight.table, sight.recogniser)
-    trial.see(sight.table.rows[start, 0])
+def _compile(model: VideoModel, start: int) -> None:
+    """Choose once without a picture, so that compiling does not delay the first real choice."""
+    trial = VideoControl(model.forest, model.table, model.recogniser)
+    trial.see(model.table.rows[start, 0])
     trial.choose(start)
 
 
-def _missing(asked: VideoAsked, count: int) -> str:
-    """What is to be said of a file that ends before it should; nothing of others."""
-    if asked.length is None or count + _FEW >= min(asked.length, _most(asked)):
+def _missing(settings: VideoSettings, count: int) -> str:
+    """What to say of a file that ends early; empty for others."""
+    length = settings.length
+    if length is None or count + _TOLERATED >= min(length, _max_pictures(settings)):
         return ""
     return (
-        f"{count} of the {asked.length} pictures that the file says it has can be read; it may be "
+        f"{count} of the {length} pictures that the file says it has can be read; it may be "
         "damaged or cut short"
     )
 
 
-def _most(asked: VideoAsked) -> int:
-    """Pictures that are watched at most."""
-    return round(asked.seconds * asked.fps)
+def _max_pictures(settings: VideoSettings) -> int:
+    """Most pictures that are followed."""
+    return round(settings.seconds * settings.fps)
 
 
-def _check_length(asked: VideoAsked, count: int, missing: str) -> None:
-    """Refuse a video that is over before there is anything to follow.
+def _check_length(settings: VideoSettings, count: int, missing: str) -> None:
+    """Refuse a video that ends before there is anything to follow.
 
     Raises:
         MotionFileError: It is too short.
     """
     empty = SegmentationConfig().empty_s
-    seconds = count / asked.fps
-    if seconds < empty + _LEAST_S:
-        # Rounded down, so that what is too short never reads as long enough.
-        said = "1 picture" if count == 1 else f"{math.floor(100 * seconds + 1e-6) / 100:.2f} s"
+    seconds = count / settings.fps
+    if seconds < empty + _MIN_S:
+        # Rounded down, so that a length that is too short never reads as long enough.
+        found = "1 picture" if count == 1 else f"{math.floor(100 * seconds + 1e-6) / 100:.2f} s"
         raise MotionFileError(
-            f"{asked.name}: {said} of video; the first {empty:g} s show the room alone, "
-            f"so expected at least {empty + _LEAST_S:g} s" + (f"; {missing}" if missing else "")
+            f"{settings.name}: {found} of video; the first {empty:g} s show the empty room, "
+            f"so expected at least {empty + _MIN_S:g} s" + (f"; {missing}" if missing else "")
         )
 
 
 class _Reel:
-    """The pictures on their way, and some moments that are kept.
+    """Hands out the pictures, and keeps some of them for the result.
 
     Attributes:
-        count: Pictures that have come.
-        waited_s: How long was waited for them [s].
-        moments: Some moments in which somebody was seen, evenly spread.
+        count: Pictures so far.
+        waited_s: Time spent waiting for them [s].
+        moments: Some moments in which a person was seen, evenly spread.
     """
 
-    def __init__(self, pictures: Iterable[Picture], asked: VideoAsked, progress: Progress) -> None:
+    def __init__(
+        self, pictures: Iterable[Picture], settings: VideoSettings, progress: Progress
+    ) -> None:
         self.count = 0
         self.waited_s = 0.0
         self.moments: list[VideoMoment] = []
         self._pictures = iter(pictures)
-        self._asked, self._progress = asked, progress
+        self._settings, self._progress = settings, progress
         self._last: Picture | None = None
         self._reported = 0.0
-        # The silhouette is of every second frame of usual videos; so are the moments.
         self._every, self._steps = 2, 0
 
     def __iter__(self) -> Iterator[Picture]:
         yield from self._until_the_end()
-        self._asked.ended()
+        self._settings.ended()
 
     def _until_the_end(self) -> Iterator[Picture]:
-        asked = self._asked
+        settings = self._settings
         empty_s = SegmentationConfig().empty_s
-        room = "learning the empty room, nobody may be in the picture"
-        most = _most(asked)
-        length = most if asked.length is None else min(most, asked.length)
-        while self.count < most:
-            if self.count > (empty_s + _LEAST_S) * asked.fps and asked.stop():
+        room = "learning the empty room; nobody may be in the picture"
+        last = _max_pictures(settings)
+        length = last if settings.length is None else min(last, settings.length)
+        while self.count < last:
+            if self.count > (empty_s + _MIN_S) * settings.fps and settings.stop():
                 return
             begun = time.perf_counter()
             self._last = next(self._pictures, None)
@@ -235,20 +236,20 @@ class _Reel:
             if self._last is None:
                 return
             self.count += 1
-            passed = self.count / asked.fps
+            passed = self.count / settings.fps
             if passed <= empty_s:
-                self._progress(room, self.count, round(empty_s * asked.fps))
+                self._progress(room, self.count, round(empty_s * settings.fps))
             else:
-                self._progress(f"watching {asked.name}", self.count, length)
+                self._progress(f"watching {settings.name}", self.count, length)
             yield self._last
 
     def waited_since(self) -> float:
-        """How long was waited since this was asked last [s]."""
-        since, self._reported = self.waited_s - self._reported, self.waited_s
-        return since
+        """Time spent waiting since the last call [s]."""
+        waited, self._reported = self.waited_s - self._reported, self.waited_s
+        return waited
 
     def keep(self, step: Followed) -> None:
-        """Keep the moment of a choice, where somebody is seen and it is its turn."""
+        """Keep the moment of every second choice (later: fourth ...) in which a person is seen."""
         require("cv2")
         import cv2
 
@@ -264,40 +265,40 @@ class _Reel:
             self._every *= 2
 
 
-def _outing(
+def _run(
     graph: MotionGraph,
     character: Character,
-    sight: Sight,
+    model: VideoModel,
     start: int,
     steps: Sequence[Followed],
     reel: _Reel,
-    asked: VideoAsked,
+    settings: VideoSettings,
     fps: float,
-) -> Outing:
-    """What was watched as an outing."""
+) -> AvatarRun:
+    """The run of what was followed."""
     path = np.concatenate([[start], *(step.frames for step in steps)]).astype(np.int32)
     composition = play_in_world(graph, character, path, fps)
-    clusters = sight.forest.clusters
+    clusters = model.forest.clusters
     played = np.cumsum([len(step.frames) for step in steps])
     times = [step.time_s for step in steps]
-    told = [step.told for step in steps]
+    person = [step.told for step in steps]
     chosen = [step.cluster for step in steps]
     avatar = [int(clusters.labels[path[number]]) for number in played]
-    seen = [(a, b) for a, b in zip(told, avatar, strict=True) if a is not None]
+    seen = [(a, b) for a, b in zip(person, avatar, strict=True) if a is not None]
     together = float(np.mean([a == b for a, b in seen]))
-    words = [in_words(graph, clusters.labels == k) for k in range(len(clusters))]
+    words = [describe_frames(graph, clusters.labels == k) for k in range(len(clusters))]
     examples = graph.database.poses[clusters.examples]
     watched = VideoControlStory(
         motion=composition.motion,
         moments=reel.moments,
-        line=ActionTimeline(times, told, chosen, avatar),
+        line=ActionTimeline(times, person, chosen, avatar),
         poses=examples,
         words=words,
     )
     title = "An avatar that follows a video"
     subtitle = (
-        f"{asked.name[-60:]}, {times[-1]:.1f} s; the avatar does what the person is seen to do for "
-        f"{together:.0%} of the time, seed {asked.seed}"
+        f"{settings.name[-60:]}, {times[-1]:.1f} s; the avatar does what the person does "
+        f"{together:.0%} of the time, seed {settings.seed}"
     )
 
     def picture(out: Path) -> None:
@@ -316,18 +317,19 @@ def _outing(
         }
         for k, frame in enumerate(clusters.examples)
     ]
-    return Outing.of(
+    return AvatarRun.of(
         composition,
         graph,
+        character,
         title=title,
         subtitle=subtitle,
         about={
-            "seed": asked.seed,
-            "video": {"name": asked.name, "fps": asked.fps, "pictures": reel.count},
-            "first_seen_s": next(t for t, k in zip(times, told, strict=True) if k is not None),
+            "seed": settings.seed,
+            "video": {"name": settings.name, "fps": settings.fps, "pictures": reel.count},
+            "first_seen_s": next(t for t, k in zip(times, person, strict=True) if k is not None),
             "avatar_as_seen_share": together,
             "actions": about,
-            "person": _stretches(times, told),
+            "person": _stretches(times, person),
             "chosen": _stretches(times, chosen),
             "avatar": _stretches(times, avatar),
         },
@@ -335,35 +337,35 @@ def _outing(
     )
 
 
-def in_words(graph: MotionGraph, own: np.ndarray) -> str:
-    """How somebody moves on the whole in some frames of the database.
+def describe_frames(graph: MotionGraph, chosen: np.ndarray) -> str:
+    """The mean movement in some frames of the database, in words.
 
     Args:
-        graph: Whose frames.
-        own: (n,) whether a frame counts.
+        graph: The graph of the database.
+        chosen: (n,) bool, which frames.
     """
     database = graph.database
     planar, fps = database.planar, database.fps
-    frames = np.flatnonzero(own & (database.successors >= 0))
+    frames = np.flatnonzero(chosen & (database.successors >= 0))
     if len(frames) == 0:
         return "a moment"
-    later = database.successors[frames]
-    moved = (planar[later, :2] - planar[frames, :2]) * fps
+    nexts = database.successors[frames]
+    moved = (planar[nexts, :2] - planar[frames, :2]) * fps
     cosine, sine = np.cos(planar[frames, 3]), np.sin(planar[frames, 3])
     ahead = float(np.mean(cosine * moved[:, 0] + sine * moved[:, 1]))
     left = float(np.mean(cosine * moved[:, 1] - sine * moved[:, 0]))
     speed = float(np.hypot(ahead, left))
-    if speed < _STANDING:
-        usual = float(np.median(np.hypot(*moved.T)))
-        said = "stays in place" if usual < _STANDING else "goes to and fro"
+    if speed < _STANDING_M_S:
+        typical = float(np.median(np.hypot(*moved.T)))
+        text = "stays in place" if typical < _STANDING_M_S else "goes to and fro"
     elif abs(left) > abs(ahead):
-        said = f"goes {'left' if left > 0 else 'right'} at {speed:.1f} m/s"
+        text = f"goes {'left' if left > 0 else 'right'} at {speed:.1f} m/s"
     else:
-        said = f"goes {'ahead' if ahead > 0 else 'back'} at {speed:.1f} m/s"
-    turn = float(np.degrees(np.mean(wrapped(planar[later, 3] - planar[frames, 3]))) * fps)
-    if abs(turn) < _STRAIGHT:
-        return said
-    return f"{said}, turns {'left' if turn > 0 else 'right'} at {abs(turn):.0f} deg/s"
+        text = f"goes {'ahead' if ahead > 0 else 'back'} at {speed:.1f} m/s"
+    turn = float(np.degrees(np.mean(wrapped(planar[nexts, 3] - planar[frames, 3]))) * fps)
+    if abs(turn) < _STRAIGHT_DEG_S:
+        return text
+    return f"{text}, turns {'left' if turn > 0 else 'right'} at {abs(turn):.0f} deg/s"
 
 
 def _stretches(times: Sequence[float], numbers: Sequence[int | None]) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Where the pictures of somebody come from: a video file, or a camera in its own time."""
+"""Pictures of a person: from a video file, or from a camera at an even rate."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynresp.support.extras import require
 _CAMERA = re.compile(r"camera(?::(\d{1,3}))?")
 
 Clock = Callable[[], float]
-"""Tells the time [s], from any moment on."""
+"""Returns the time [s] since any fixed moment."""
 
 
 def open_source(text: str) -> tuple[Video, bool]:
@@ -29,7 +29,7 @@ def open_source(text: str) -> tuple[Video, bool]:
         The open video, and whether it is a camera.
 
     Raises:
-        UsageError: It is a camera of no number.
+        UsageError: It names a camera without a number.
         MotionFileError: It cannot be opened.
         MissingExtraError: OpenCV is not installed.
     """
@@ -50,17 +50,17 @@ def open_source(text: str) -> tuple[Video, bool]:
 def evenly(
     pictures: Iterable[Picture], fps: float, clock: Clock = time.monotonic
 ) -> Iterator[Picture]:
-    """Pictures of a camera as they come, at an even rate.
+    """Pictures of a camera at an even rate.
 
-    Cameras deliver fewer pictures than they say when it is dark, and none while the computer is
-    busy. A picture is given again until the next one is there, and one too many left out, so that
-    the number of pictures tells the time. After a break of a second or more, as of a computer that
-    slept, time goes on where it stopped.
+    A camera delivers fewer pictures than it says when it is dark, and none while the computer is
+    busy. A picture is repeated until the next one is there, and one that comes too early is left
+    out, so that the number of pictures gives the time. After a break of a second or more (the
+    computer slept) time goes on where it stopped.
 
     Args:
         pictures: What the camera delivers; each is waited for.
         fps: The rate wanted [1/s].
-        clock: Tells the time.
+        clock: Returns the time [s].
     """
     begun: float | None = None
     given = 0
@@ -79,21 +79,21 @@ def evenly(
 def later(
     pictures: Iterable[Picture],
     wait_s: float,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
     clock: Clock = time.monotonic,
 ) -> Iterator[Picture]:
     """Pictures of a camera without those of the first seconds.
 
     Args:
         pictures: What the camera delivers.
-        wait_s: How long pictures are thrown away [s].
-        tell: Told how much of that time has passed [s].
-        clock: Tells the time.
+        wait_s: How long to throw pictures away [s].
+        report: Called with how much of that time has passed [s].
+        clock: Returns the time [s].
     """
     begun = clock()
     for picture in pictures:
         passed = clock() - begun
         if passed < wait_s:
-            tell(passed)
+            report(passed)
         else:
             yield picture

@@ -77,7 +77,7 @@ _Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class VideoModel:
     """What is needed to follow somebody through a graph.
 
     Attributes:
@@ -98,7 +98,7 @@ class Sight:
         most: int,
         progress: Progress,
         remark: Callable[[str], None],
-    ) -> Sight:
+    ) -> VideoModel:
         """Take what is kept of a graph; make and keep what is not.
 
         Args:
@@ -250,8 +250,8 @@ def _within(numbers: np.ndarray, end: int) -> bool:
 
 def _identity(graph: MotionGraph, table: ViewTable, most: int) -> str:
     """Short hash of all that clusters, and what tells them, follow from."""
-    told = f"{graph_identity(graph)} {table.identity} {most} {CLUSTERING_VERSION}"
-    return hashlib.sha256(told.encode()).hexdigest()[:16]
+    text = f"{graph_identity(graph)} {table.identity} {most} {CLUSTERING_VERSION}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _kept(

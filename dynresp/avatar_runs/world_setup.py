@@ -1,4 +1,4 @@
-"""The worlds of graph plans: what counts as a contact in each, and what stands about in it."""
+"""The worlds of graph specs: what counts as a contact in each, and which objects stand in it."""
 
 from __future__ import annotations
 
@@ -26,86 +26,87 @@ from dynresp.view.story import Block, MovingCapsule
 
 FLAT, TERRAIN, STOOL, PLAYGROUND = "flat", "terrain", "stool", "playground"
 
-# Boxes farther than this from a way [m] are not shown with it.
+# Boxes farther than this from a track [m] are not shown with it.
 _SHOWN_M = 12.0
 
 
 @dataclass(frozen=True, eq=False)
-class LaidOut:
+class WorldMotions:
     """Motions in their world.
 
     Attributes:
         motions: The motions.
-        contacts: Of each (frames, 2 or 4), see `database.CONTACTS`; None for those that it has.
+        contacts: (frames, 2 or 4) of each motion, see `frame_database.CONTACTS`; None for the
+            motions' own.
     """
 
     motions: Sequence[Motion]
     contacts: Sequence[BoolArray] | None = None
 
 
-def lay_out(world: str, motions: Sequence[Motion], character: Character) -> LaidOut:
+def place_in_world(world: str, motions: Sequence[Motion], character: Character) -> WorldMotions:
     """Bring motions into their world, and find what they touch there.
 
-    About the stool each is also taken turned by quarter turns: it looks alike from its four sides.
+    Each motion on the stool is also used after every quarter turn: the stool has four equal sides.
 
     Args:
         world: "flat", "terrain", "stool" or "playground".
-        motions: As they were loaded.
-        character: Whose motions they are.
+        motions: The motions as they were loaded.
+        character: Their character.
 
     Raises:
-        MotionError: On terrain, there are too few stances to tell the blocks.
+        MotionError: Motions on terrain have too few stances to find the blocks.
     """
     if world == TERRAIN:
-        return LaidOut(onto_blocks(character, motions)[0])
+        return WorldMotions(onto_blocks(character, motions)[0])
     if world == STOOL:
         motions = [copy for motion in motions for copy in from_all_sides(motion)]
-        return LaidOut(motions, [stool_contacts(motion, character) for motion in motions])
+        return WorldMotions(motions, [stool_contacts(motion, character) for motion in motions])
     if world == PLAYGROUND:
-        return LaidOut(motions, [playground_contacts(motion, character) for motion in motions])
-    return LaidOut(motions)
+        return WorldMotions(motions, [playground_contacts(motion, character) for motion in motions])
+    return WorldMotions(motions)
 
 
 def play_in_world(
     graph: MotionGraph, character: Character, frames: npt.ArrayLike, fps: float
 ) -> Composition:
-    """Play a walk as its world asks: on the playground hands hold on to the bars.
+    """Play a walk in its world: on the playground hands hold on to the bars.
 
     Args:
-        graph: Whose walk; its database knows the world.
-        character: Whose body it is.
-        frames: (k,) a walk; two frames or more.
+        graph: The motion graph; its database says which world.
+        character: The avatar's body.
+        frames: (k,) the walk, two frames or more.
         fps: Frame rate of the motion [1/s].
 
     Raises:
-        UsageError: The graph is one of rough terrain: a walk frame by frame knows no blocks.
+        UsageError: The graph is one of rough terrain: its walks need blocks.
     """
-    refuse_blocks(graph)
+    refuse_terrain(graph)
     if graph.database.world == PLAYGROUND:
         return compose_on_playground(graph, character, frames, fps)
     return compose(graph, character, frames, fps=fps)
 
 
-def refuse_blocks(graph: MotionGraph) -> None:
-    """Refuse a graph of rough terrain where nothing says which blocks are walked on.
+def refuse_terrain(graph: MotionGraph) -> None:
+    """Refuse a graph of rough terrain.
 
     Raises:
         UsageError: It is one.
     """
     if graph.database.world == TERRAIN:
         raise UsageError(
-            "on rough terrain a way is searched over blocks that are drawn, and neither choice nor "
-            "balls know them: use `dynresp graph walk` without --choose, --choices and --balls, or "
-            "`dynresp graph sketch`"
+            "the graph holds steps over rough terrain, which need blocks to step on, and this kind "
+            "of run has none; build another graph, or use `dynresp graph walk` or `dynresp graph "
+            "sketch`"
         )
 
 
 def blocks_of(world: World | None, track: FloatArray | None = None) -> list[Block]:
-    """The boxes of a world as they are shown.
+    """The boxes of a world, as pictures show them.
 
     Args:
-        world: Boxes; None for none.
-        track: (n, 2) a way through them [m]: boxes far from it are left out.
+        world: The boxes; None for no boxes.
+        track: (n, 2) a walk between them [m]; boxes more than 12 m from it are left out.
     """
     if world is None:
         return []
@@ -119,12 +120,12 @@ def blocks_of(world: World | None, track: FloatArray | None = None) -> list[Bloc
     ]
 
 
-def standing_about(world: str, frames: int) -> tuple[list[Block], list[MovingCapsule]]:
-    """What is shown of a world: blocks and bars.
+def standing_objects(world: str, frames: int) -> tuple[list[Block], list[MovingCapsule]]:
+    """The blocks and bars of a world, as pictures show them.
 
     Args:
         world: "flat", "terrain", "stool" or "playground".
-        frames: Of the story in which it is shown.
+        frames: Frames of the story that shows them.
     """
     if world == STOOL:
         return blocks_of(stool_world()), []

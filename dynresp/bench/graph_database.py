@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dynresp.avatar_runs.graph_building import build_graph
-from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, read_graph_spec
 from dynresp.locomotion.graph.frame_database import Clip, MotionDatabase
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion import rotations
@@ -86,7 +86,7 @@ def graphs_at_hand(
         DynrespError: There is no such plan, or motions cannot be read.
     """
     for name in names:
-        path = find_plan(name)
+        path = find_graph_spec(name)
         try:
             graph = _built(path, tuple(folders), character)
         except MissingMotionDataError:
@@ -99,7 +99,7 @@ def graphs_at_hand(
 @functools.lru_cache(maxsize=8)
 def _built(path: Path, folders: tuple[Path, ...], character: Character) -> MotionGraph:
     """The graph of a plan; most of the time goes into reading motions, and parts share them."""
-    return build_graph(read_plan(path), folders, path.parent, character, lambda *_: None)
+    return build_graph(read_graph_spec(path), folders, path.parent, character, lambda *_: None)
 
 
 def recorded_database(motions: Path | None, character: Character) -> tuple[str, MotionDatabase]:

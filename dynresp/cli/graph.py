@@ -1,4 +1,4 @@
-"""`dynresp graph`: motion graphs, and avatars that go through them."""
+"""`dynresp graph`: motion graphs, and avatars that walk through them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dynresp.cli.graph_walk import walk
 from dynresp.cli.graph_watch import watch
 
 app = typer.Typer(
-    help="Motion graphs: avatars that walk on for ever through recorded motion.",
+    help="Motion graphs: avatars that walk without end through recorded motion.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )

@@ -1,4 +1,4 @@
-"""`dynresp graph build`: from motions to a graph."""
+"""`dynresp graph build`: make a motion graph of motions."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import typer
 from dynresp.cli.options import Json, Motions
 from dynresp.cli.progress_bar import progress
 
-# The plan that is taken where none is named, and the one for want of its motions.
+# The usual spec, and the one to use if its motions are not on this machine.
 _USUAL, _INSTEAD = "walking", "builtin"
 
 
 def build(
     out: Annotated[Path, typer.Option("--out", metavar="GRAPH.npz", help="The graph's file.")],
-    plan: Annotated[
+    spec: Annotated[
         str | None,
         typer.Argument(
-            metavar="[PLAN]",
-            help="A plan that comes with dynresp (walking, builtin, ...) or a file (.toml); by "
-            "default walking, or builtin where its motions are not on this machine.",
+            metavar="[SPEC]",
+            help="A graph spec that comes with dynresp (walking, builtin, ...) or a file (.toml); "
+            "by default walking, or builtin if its motions are not on this machine.",
         ),
     ] = None,
     motions: Motions = None,
     as_json: Json = False,
 ) -> None:
-    """Build a motion graph, and say how many jumps each pruning rule has left."""
+    """Build a motion graph, and say how many jumps each pruning rule leaves."""
     from dynresp.avatar_runs.graph_building import build_graph
-    from dynresp.avatar_runs.graph_spec import find_plan, read_plan
-    from dynresp.cli.graph_info import tell_graph
+    from dynresp.avatar_runs.graph_spec import find_graph_spec, read_graph_spec
+    from dynresp.cli.graph_info import graph_text
     from dynresp.cli.run import check_file
     from dynresp.locomotion.graph.graph_file import save_graph
     from dynresp.motion.character import default_character
@@ -41,19 +41,19 @@ def build(
     folders = motion_folders(motions)
     character = default_character()
     with progress() as tell:
-        path = find_plan(plan or _USUAL)
+        path = find_graph_spec(spec or _USUAL)
         try:
-            graph = build_graph(read_plan(path), folders, path.parent, character, tell)
+            graph = build_graph(read_graph_spec(path), folders, path.parent, character, tell)
         except MissingMotionDataError:
-            if plan is not None:
+            if spec is not None:
                 raise
             typer.echo(
                 f"dynresp: the motions of {_USUAL!r} are not on this machine; building the graph "
                 "of built-in motion. Fetch them with `dynresp motions fetch graphs`.",
                 err=True,
             )
-            path = find_plan(_INSTEAD)
-            graph = build_graph(read_plan(path), folders, path.parent, character, tell)
+            path = find_graph_spec(_INSTEAD)
+            graph = build_graph(read_graph_spec(path), folders, path.parent, character, tell)
         tell(f"writing {out}", 0, 1)
         save_graph(graph, out)
-    typer.echo(tell_graph(graph, out, as_json))
+    typer.echo(graph_text(graph, out, as_json))

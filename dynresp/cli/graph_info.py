@@ -1,4 +1,4 @@
-"""`dynresp graph info`: what a graph is made of, and what was pruned."""
+"""`dynresp graph info`: the motions of a graph, and how many jumps were pruned."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ Graph = Annotated[
 
 
 def info(graph: Graph, as_json: Json = False) -> None:
-    """Show what a graph is made of, and how many jumps each pruning rule has left."""
+    """Show the motions of a graph, and how many jumps each pruning rule leaves."""
     from dynresp.locomotion.graph.graph_file import load_graph
 
-    typer.echo(tell_graph(load_graph(graph), graph, as_json))
+    typer.echo(graph_text(load_graph(graph), graph, as_json))
 
 
 def graph_facts(graph: MotionGraph) -> dict[str, Any]:
     """Facts about a graph, for `--json`."""
     import dataclasses
 
-    from dynresp.avatar_runs.avatar_run import about_graph
+    from dynresp.avatar_runs.avatar_run import graph_summary
 
     config = dataclasses.asdict(graph.config)
     config["coordinates"] = graph.config.coordinates.value
     counts = graph.counts
     return {
-        **about_graph(graph),
+        **graph_summary(graph),
         "seconds": len(graph.database) / graph.config.fps,
         "frames_in_component": counts.component_frames,
         "jumps_left": {
@@ -55,13 +55,13 @@ def graph_facts(graph: MotionGraph) -> dict[str, Any]:
     }
 
 
-def tell_graph(graph: MotionGraph, path: Path, as_json: bool) -> str:
+def graph_text(graph: MotionGraph, path: Path, as_json: bool) -> str:
     """Facts about a graph as text, or as one JSON object."""
     facts = graph_facts(graph)
     if as_json:
         return json.dumps(facts, indent=2)
     left = facts["jumps_left"]
-    similarity = "not in force" if left["similarity"] is None else f"{left['similarity']:,}"
+    similarity = "not used" if left["similarity"] is None else f"{left['similarity']:,}"
     lines = [
         f"{path}  {facts['identity']}",
         f"  {facts['frames']:,} frames at {facts['fps']:g} fps ({facts['seconds'] / 60:.1f} min), "
@@ -77,6 +77,6 @@ def tell_graph(graph: MotionGraph, path: Path, as_json: bool) -> str:
         f"    component        {left['component']:>15,}",
     ]
     if facts["built_in_clips"]:
-        lines.append(f"  {facts['built_in_clips']} clips are built-in motion, no motion capture")
+        lines.append(f"  {facts['built_in_clips']} clips are built-in motion, not motion capture")
     lines += [f"  {credit}" for credit in facts["credits"]]
     return "\n".join(lines)

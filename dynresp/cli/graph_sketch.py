@@ -1,4 +1,4 @@
-"""`dynresp graph sketch`: an avatar that walks along a drawn path, or to a place."""
+"""`dynresp graph sketch`: an avatar that walks along a drawn path, or to a goal."""
 
 from __future__ import annotations
 
@@ -28,16 +28,18 @@ def sketch(
     ] = None,
     path: Annotated[
         Path | None,
-        typer.Option("--path", metavar="FILE.csv", help="The same, a corner a line: x, y."),
+        typer.Option("--path", metavar="FILE.csv", help="The same, one corner per line: x, y."),
     ] = None,
     goal: Annotated[
         str | None,
-        typer.Option("--goal", metavar="X,Y", help="A place to reach; the path is then planned."),
+        typer.Option(
+            "--goal", metavar="X,Y", help="Where to go instead; the path is then planned."
+        ),
     ] = None,
     start: Annotated[
         str | None,
         typer.Option(
-            "--start", metavar="X,Y", help="Where it begins; by default where the path does."
+            "--start", metavar="X,Y", help="Where to begin; by default where the path does."
         ),
     ] = None,
     world: Annotated[
@@ -52,52 +54,47 @@ def sketch(
     video: Video = True,
     as_json: Json = False,
 ) -> None:
-    """Walk along a sketched path around obstacles, or to a goal.
+    """Walk along a path or to a goal, around obstacles.
 
-    In a maze without a path it goes from corner to corner; so it does over rough terrain, which is
-    drawn from the seed and reaches from 0 to 12.2 m along x and y. Writes result.json, motion.npz,
-    motion.bvh, recording.html, filmstrip.png, plan.png and, where the machine can render,
-    video.mp4.
+    In a maze without path and goal the avatar goes from corner to corner. So it does over rough
+    terrain, which is drawn from the seed, from 0 to 12.2 m along x and y. Writes result.json,
+    motion.npz, motion.bvh, recording.html, filmstrip.png, plan.png and, where the machine can
+    render, video.mp4.
     """
-    from dynresp.avatar_runs.asked import Asked
-    from dynresp.avatar_runs.sketch_run import sketch_outing
+    from dynresp.avatar_runs.sketch_run import sketch_run
     from dynresp.avatar_runs.world_spec import read_world
     from dynresp.locomotion.graph.graph_file import load_graph
     from dynresp.motion.character import default_character
 
-    asked = Asked(
-        path=read_points(points, path),
-        goal=None if goal is None else one_point(goal, "--goal"),
-        start=None if start is None else one_point(start, "--start"),
-        maze=maze,
-        seed=seed or 0,
-    )
+    corners = read_points(points, path)
+    goal_m = None if goal is None else read_point(goal, "--goal")
+    start_m = None if start is None else read_point(start, "--start")
     loaded = load_graph(graph)
     boxes = None if world is None else read_world(world)
     check_folder(out)
     with progress() as tell:
-        outing = sketch_outing(loaded, default_character(), asked, boxes, fps, tell)
-    # Over terrain there is no such figure; nor is there one of a goal.
-    off = outing.about.get("sketch", {}).get("off_sketch_worst_m")
-    if off is not None and off > _MISSED_M:
-        why = "; obstacles stand there" if boxes is not None or maze else ""
-        typer.echo(
-            f"dynresp: to a corner of the path sketched it comes no nearer than {off:.1f} m{why}",
-            err=True,
-        )
-    finish(out, loaded, outing, video, as_json)
+        run = sketch_run(
+            loaded, default_character(), path=corners, goal=goal_m, start=start_m, world=boxes,
+            maze=maze, seed=seed or 0, fps=fps, progress=tell,
+        )  # fmt: skip
+    # This is known of a path only, and not over terrain.
+    off = run.about.get("sketch", {}).get("off_sketch_worst_m")
+    if off is not None and off > _MAX_OFF_M:
+        why = "; obstacles are in the way" if boxes is not None or maze else ""
+        typer.echo(f"dynresp: the walk misses a corner of the path by {off:.1f} m{why}", err=True)
+    finish(out, run, video, as_json)
 
 
 def read_points(text: str | None, file: Path | None) -> FloatArray | None:
-    """The corners of a path, given as text or in a file; None for none.
+    """The corners (k, 2) of a path [m], given as text or in a file; None if neither is given.
 
     Raises:
-        UsageError: Both are given, or one is not what it should be.
+        UsageError: Both are given, or it is not a path.
     """
     from dynresp.support.errors import UsageError
 
     if text is not None and file is not None:
-        raise UsageError("give the path by --points or by --path, not by both")
+        raise UsageError("give the path either by --points or by --path, got both")
     if text is not None:
         return _corners(text.split(), "--points")
     if file is None:
@@ -106,13 +103,12 @@ def read_points(text: str | None, file: Path | None) -> FloatArray | None:
     return _corners(rows, f"--path: {file}")
 
 
-# Farther from the walk than this a corner is told to be missed [m].
-_MISSED_M = 1.0
-# Largest file of corners that is read [bytes]; and how far corners may be away [m].
-_MOST_BYTES = 1 << 20
-_FARTHEST = 10_000.0
-# Most corners of a path.
-_MOST_CORNERS = 10_000
+# A corner farther than this from the walk is reported [m].
+_MAX_OFF_M = 1.0
+# Largest file of corners [bytes], largest coordinate [m], most corners.
+_MAX_BYTES = 1 << 20
+_MAX_COORDINATE_M = 10_000.0
+_MAX_CORNERS = 10_000
 
 
 def _lines(file: Path) -> list[str]:
@@ -121,42 +117,44 @@ def _lines(file: Path) -> list[str]:
 
     try:
         with file.open("rb") as stream:
-            data = stream.read(_MOST_BYTES + 1)
+            data = stream.read(_MAX_BYTES + 1)
     except OSError as error:
         raise UsageError(
             f"--path: {file} cannot be read ({error.strerror}); expected lines of x, y [m]"
         ) from None
-    # Before it is decoded: what is read of a larger file may end inside a character.
-    if len(data) > _MOST_BYTES:
-        raise UsageError(f"--path: {file} is larger than {_MOST_BYTES // 1024} KiB; no path is")
+    # Checked before decoding: what is read of a larger file may end inside a character.
+    if len(data) > _MAX_BYTES:
+        raise UsageError(
+            f"--path: {file} is larger than {_MAX_BYTES // 1024} KiB, the largest that is read"
+        )
     try:
         return data.decode("utf-8").splitlines()
     except UnicodeDecodeError:
-        raise UsageError(f"--path: {file} is no text; expected lines of x, y [m]") from None
+        raise UsageError(f"--path: {file} is not text; expected lines of x, y [m]") from None
 
 
 def _corners(words: list[str], where: str) -> FloatArray:
-    """The corners (k, 2) of a path of which each word is one."""
+    """The corners (k, 2) of a path [m], one from each word."""
     import numpy as np
 
     from dynresp.locomotion.worlds.paths import check_length
     from dynresp.support.errors import UsageError
 
-    if len(words) > _MOST_CORNERS:
+    if len(words) > _MAX_CORNERS:
         raise UsageError(
-            f"{where}: a path of {len(words)} corners; at most {_MOST_CORNERS} are allowed, so "
-            "leave out corners that lie near to each other"
+            f"{where}: a path of {len(words)} corners; at most {_MAX_CORNERS} are allowed, so "
+            "leave out corners that are close together"
         )
-    points = np.array([one_point(word, where) for word in words]).reshape(-1, 2)
+    points = np.array([read_point(word, where) for word in words]).reshape(-1, 2)
     check_length(points, f"{where}: the path")
     return points
 
 
-def one_point(text: str, where: str) -> tuple[float, float]:
-    """A point on the ground, from "x,y".
+def read_point(text: str, where: str) -> tuple[float, float]:
+    """A point on the ground [m], from "x,y".
 
     Raises:
-        UsageError: It is none.
+        UsageError: The text is not a point.
     """
     from dynresp.support.errors import UsageError
 
@@ -165,8 +163,8 @@ def one_point(text: str, where: str) -> tuple[float, float]:
         x, y = (float(word) for word in words)
     except ValueError:
         raise UsageError(f"{where}: expected x,y in metres, got {text.strip()[:60]!r}") from None
-    if not (abs(x) <= _FARTHEST and abs(y) <= _FARTHEST):
+    if not (abs(x) <= _MAX_COORDINATE_M and abs(y) <= _MAX_COORDINATE_M):
         raise UsageError(
-            f"{where}: points must be within {_FARTHEST:g} m, got {text.strip()[:60]!r}"
+            f"{where}: points must be within {_MAX_COORDINATE_M:g} m, got {text.strip()[:60]!r}"
         )
     return x, y

@@ -1,4 +1,4 @@
-"""`dynresp graph watch`: an avatar that does what somebody does in a video."""
+"""`dynresp graph watch`: an avatar that follows a person in a video."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from dynresp.cli.options import Json, Seed
 from dynresp.cli.progress_bar import progress
 from dynresp.cli.run import check_folder
 
-# Time to step out of a camera's picture [s].
+# Time to step out of a camera's picture, and the longest time to follow [s].
 _STEP_OUT_S = 5.0
-# Longest time that is watched [s].
-_LONGEST_S = 3600.0
+_MAX_S = 3600.0
 
 
 def watch(
@@ -41,8 +40,8 @@ def watch(
         typer.Option(
             "--seconds",
             min=2.0,
-            max=_LONGEST_S,
-            help="Stop after so long; by default where the video ends, of a camera at Ctrl-C.",
+            max=_MAX_S,
+            help="When to stop; by default at the end of the video, of a camera at Ctrl-C.",
         ),
     ] = None,
     clusters: Annotated[
@@ -51,7 +50,8 @@ def watch(
             "--clusters",
             min=2,
             max=12,
-            help="Most actions told apart. The more there are, the more often they are mistaken.",
+            help="Most actions to distinguish. The more there are, the more often one is taken for "
+            "another.",
         ),
     ] = 5,
     seed: Seed = None,
@@ -59,17 +59,17 @@ def watch(
     video: Video = True,
     as_json: Json = False,
 ) -> None:
-    """Follow somebody who acts before a camera: the avatar does what the person does.
+    """Follow a person in a video or before a camera: the avatar does what the person does.
 
-    The camera stands still and sees the whole person. The first second shows the room alone, with
-    nobody in it; before a camera there are 5 s to step out of the picture. Writes result.json,
-    motion.npz, motion.bvh, recording.html, filmstrip.png, plan.png, watching.png (what was seen,
-    and what the avatar did) and, where the machine can render, video.mp4. What is learnt of a
-    graph, a minute the first time, is kept in the cache folder.
+    The camera must not move and must see the whole person. The first second must show the empty
+    room; before a camera you have 5 s to step out of the picture. Writes result.json, motion.npz,
+    motion.bvh, recording.html, filmstrip.png, plan.png, watching.png (what was seen, and what the
+    avatar did) and, where the machine can render, video.mp4. The first run with a graph takes a
+    minute longer; what it learns is kept in the cache folder.
     """
-    from dynresp.avatar_runs.video_run import VideoAsked, check_watchable, watch_outing
+    from dynresp.avatar_runs.video_run import VideoSettings, check_watchable, video_run
     from dynresp.avatar_runs.video_source import evenly, later, open_source
-    from dynresp.avatar_runs.visible_cluster_file import Sight
+    from dynresp.avatar_runs.visible_cluster_file import VideoModel
     from dynresp.locomotion.graph.graph_file import load_graph
     from dynresp.motion.character import default_character
 
@@ -80,7 +80,7 @@ def watch(
     character = default_character()
     remarks: list[str] = []
     with opened, stopping(live) as stop, progress() as tell:
-        sight = Sight.of(loaded, character, clusters, tell, remarks.append)
+        model = VideoModel.of(loaded, character, clusters, tell, remarks.append)
         pictures = iter(opened)
         if live:
 
@@ -88,32 +88,34 @@ def watch(
                 tell("step out of the picture", int(time_s), int(_STEP_OUT_S))
 
             pictures = evenly(later(pictures, _STEP_OUT_S, passed), opened.fps)
-        asked = VideoAsked(
+        settings = VideoSettings(
             name=opened.name if live else Path(source).name,
             fps=opened.fps,
-            seconds=_LONGEST_S if seconds is None else seconds,
+            seconds=_MAX_S if seconds is None else seconds,
             length=opened.length,
             seed=seed or 0,
             stop=stop,
             ended=stop.ended,
         )
-        outing, pace = watch_outing(
-            loaded, character, sight, pictures, asked, fps, tell, remarks.append
+        run, pace = video_run(
+            loaded, character, model, pictures, settings, fps, tell, remarks.append
         )
     for remark in remarks:
         typer.echo(f"dynresp: {remark}", err=True)
-    said = f"{pace.choices} choices, {pace.choices_per_s:.0f} a second of computing (10 are due)"
-    finish(out, loaded, outing, video, as_json, {"pace": dataclasses.asdict(pace)}, [said])
+    speed = (
+        f"{pace.choices} choices, {pace.choices_per_s:.0f} per second of computing (10 are needed)"
+    )
+    finish(out, run, video, as_json, {"pace": dataclasses.asdict(pace)}, [speed])
 
 
 class Stop:
-    """Ctrl-C ends the watching, and the program goes on to write what came of it.
+    """Makes Ctrl-C end the following, so that the program goes on and writes the result.
 
-    Before the watching has begun, after it has ended, and the second time, it interrupts as ever.
+    Before following begins, after it ends, and the second time, Ctrl-C interrupts as usual.
     """
 
     def __init__(self) -> None:
-        """Nothing has come yet."""
+        """Begin without a signal."""
         self._came = self._watching = False
         self.before: Any = None
 
@@ -123,11 +125,11 @@ class Stop:
         return self._came
 
     def ended(self) -> None:
-        """No more is watched."""
+        """Note that following has ended."""
         self._watching = False
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """Take in a signal."""
+        """Handle a signal."""
         if self._watching and not self._came:
             self._came = True
         else:
@@ -136,10 +138,10 @@ class Stop:
 
 @contextmanager
 def stopping(live: bool) -> Iterator[Stop]:
-    """Asked during the block, tells whether somebody wants a camera to be left.
+    """During the block, handle Ctrl-C by the `Stop` that it gives.
 
     Args:
-        live: Whether it is one; a file is interrupted as everything else is.
+        live: Whether the pictures come from a camera; with a file Ctrl-C interrupts as usual.
     """
     stop = Stop()
     stop.before = signal.getsignal(signal.SIGINT)

@@ -18,7 +18,7 @@ from matplotlib.patches import Ellipse, Polygon
 from matplotlib.typing import ColorType
 
 from dynresp.avatar_runs.graph_building import build_graph
-from dynresp.avatar_runs.graph_spec import find_plan, plans_folder, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, graph_specs_folder, read_graph_spec
 from dynresp.locomotion.choice.actions import offer_actions
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest, ClusterTree
 from dynresp.locomotion.graph import placement
@@ -50,11 +50,11 @@ def built(name: str, leave_out: tuple[str, ...] = ()) -> MotionGraph | None:
         name: The plan.
         leave_out: Motions to leave out besides those that the plan leaves out.
     """
-    plan = read_plan(find_plan(name))
+    plan = read_graph_spec(find_graph_spec(name))
     plan = plan.model_copy(update={"leave_out": [*plan.leave_out, *leave_out]})
     character, told = default_character(), lambda *_: None
     try:
-        return build_graph(plan, motion_folders(None), plans_folder(), character, told)
+        return build_graph(plan, motion_folders(None), graph_specs_folder(), character, told)
     except MissingMotionDataError:
         return None
 

@@ -30,10 +30,9 @@ import transitions
 from matplotlib import pyplot as plt
 from matplotlib.colors import LogNorm
 
-from dynresp.avatar_runs.asked import Asked
-from dynresp.avatar_runs.avatar_run import Outing
-from dynresp.avatar_runs.sketch_run import sketch_outing
-from dynresp.avatar_runs.world_setup import standing_about
+from dynresp.avatar_runs.avatar_run import AvatarRun
+from dynresp.avatar_runs.sketch_run import sketch_run
+from dynresp.avatar_runs.world_setup import standing_objects
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
 from dynresp.locomotion.clusters.cluster_observations import observations
 from dynresp.locomotion.clusters.frame_clusters import Clusters
@@ -261,7 +260,7 @@ apart = np.linalg.norm(ends[:, None, :3] - ends[None, :, :3], axis=-1)
 chosen = [int(np.argmax([path.log_probability for path in paths]))]
 while len(chosen) < min(3, len(paths)):
     chosen.append(int(np.argmax(apart[chosen].min(axis=0))))
-blocks, bars = standing_about(clustered.database.world, 1)
+blocks, bars = standing_objects(clustered.database.world, 1)
 fig, cells = plt.subplots(1, len(chosen), figsize=(13, 4.2), squeeze=False)
 for axes, k in zip(cells[0], chosen, strict=True):
     frames = paths[k].frames
@@ -289,15 +288,15 @@ graphs.offered(forest, 5)
 # %%
 t = np.linspace(0.0, 1.0, 60)
 wave = np.stack([9.0 * t, 1.2 * np.sin(2.0 * np.pi * 1.3 * t)], axis=1)
-outings = {
-    "sketch": sketch_outing(walking, character, Asked(path=wave)),
-    "maze": sketch_outing(walking, character, Asked(maze=True, seed=3)),
+runs = {
+    "sketch": sketch_run(walking, character, path=wave),
+    "maze": sketch_run(walking, character, maze=True, seed=3),
 }
 fig, cells = plt.subplots(1, 2, figsize=(13, 5.4), width_ratios=(1.25, 1))
-for axes, (name, outing) in zip(cells, outings.items(), strict=True):
-    motion, told = outing.motion, outing.about["sketch"]
-    graphs.ground(axes, outing.blocks)
-    for line in outing.paths:
+for axes, (name, run) in zip(cells, runs.items(), strict=True):
+    motion, told = run.motion, run.about["sketch"]
+    graphs.ground(axes, run.blocks)
+    for line in run.paths:
         axes.plot(*line.points.T, color=study.GREY, lw=5, alpha=0.5)
     graphs.soles(axes, measure_gait(motion, character))
     axes.plot(*motion.root_positions[:, :2].T, color=study.RED, lw=1)
@@ -317,7 +316,7 @@ plt.show()
 # %%
 strolled = random_walk(walking, round(60 * walking.config.fps), np.random.default_rng(1))
 composition = compose(walking, character, strolled, fps=30.0)
-outings["walk at random"] = Outing.of(composition, walking, title="", subtitle="")
+runs["walk at random"] = AvatarRun.of(composition, walking, character, title="", subtitle="")
 
 
 def slides(motions):
@@ -328,9 +327,9 @@ def slides(motions):
 
 
 rows = []
-for name, outing in outings.items():
-    rows.append((f"{name}, as blended", len(outing.jumps_s), *slides([outing.sliding])))
-    rows.append((f"{name}, fitted", "", *slides([outing.motion])))
+for name, run in runs.items():
+    rows.append((f"{name}, as blended", len(run.jumps_s), *slides([run.sliding])))
+    rows.append((f"{name}, fitted", "", *slides([run.motion])))
 clips = range(0, len(walking.database.clips), 4)
 rows.append(("recorded, every fourth clip", "-", *slides(map(walking.database.motion, clips))))
 study.table(("", "jumps", "stances", "median [cm]", "95 % [cm]", "worst [cm]"), rows)

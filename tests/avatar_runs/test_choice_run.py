@@ -1,8 +1,13 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from dynresp.avatar_runs.choice_run import in_words
+from dynresp.avatar_runs.choice_run import choice_run, describe_action, given_answers
 from dynresp.locomotion.choice.actions import OfferedAction
+from dynresp.locomotion.graph.motion_graph import MotionGraph
+from dynresp.motion.character import Character
+from dynresp.support.errors import UsageError
 
 
 def action(*corners: tuple[float, float, float]) -> OfferedAction:
@@ -24,5 +29,38 @@ def action(*corners: tuple[float, float, float]) -> OfferedAction:
         (((5, 5, 165), (5, 5, -165)), "stays, turns 30 deg left, in 1.0 s"),
     ],
 )
-def test_actions_in_words(corners: tuple[tuple[float, float, float], ...], said: str) -> None:
-    assert in_words(action(*corners), 1.0) == said
+def test_actions_describe_action(
+    corners: tuple[tuple[float, float, float], ...], said: str
+) -> None:
+    assert describe_action(action(*corners), 1.0) == said
+
+
+def test_given_answers(graph: MotionGraph, character: Character, tmp_path: Path) -> None:
+    run = choice_run(graph, character, given_answers([1, None, 0]))
+    content = run.save(tmp_path, video=False)
+    assert [moment["picked"] for moment in content["choices"]] == [1, None, 0]
+    assert all(len(moment["offered"]) >= 3 for moment in content["choices"])
+    assert (tmp_path / "options.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+
+
+def test_no_answers(graph: MotionGraph, character: Character) -> None:
+    run = choice_run(graph, character, given_answers([]))
+    assert run.about["choices"] == []
+    assert run.motion.duration > 1.0
+
+
+def test_an_answer_that_is_not_offered(graph: MotionGraph, character: Character) -> None:
+    for wrong in (8, -1):
+        with pytest.raises(UsageError, match=rf"at 0\.0 s \d actions are offered.*got {wrong}"):
+            choice_run(graph, character, given_answers([wrong]))
+
+
+def test_a_function_that_picks(graph: MotionGraph, character: Character) -> None:
+    times = []
+
+    def pick(time_s: float, actions: object) -> None:
+        times.append(time_s)
+
+    run = choice_run(graph, character, pick, seconds=4.0)
+    assert times == [0.0, 2.0]
+    assert run.motion.duration == pytest.approx(4.0)

@@ -5,7 +5,7 @@ import pytest
 
 from dynresp.avatar_runs import graph_building as building
 from dynresp.avatar_runs.graph_building import build_graph
-from dynresp.avatar_runs.graph_spec import GraphPlan, find_plan, read_plan
+from dynresp.avatar_runs.graph_spec import GraphSpec, find_graph_spec, read_graph_spec
 from dynresp.locomotion.graph.graph_file import graph_identity
 from dynresp.motion.character import Character
 from dynresp.motion.export import write_npz
@@ -13,13 +13,13 @@ from dynresp.support.errors import MissingMotionDataError, SpecError
 from tests.locomotion.samples import walking_motions
 
 
-def plan(*motions: str, **more: object) -> GraphPlan:
+def plan(*motions: str, **more: object) -> GraphSpec:
     content = {
         "graph": {"name": "small", "sigma": 0.3},
         "motion": [{"motion": name} for name in motions],
         **more,
     }
-    return GraphPlan.model_validate(content)
+    return GraphSpec.model_validate(content)
 
 
 def quiet(stage: str, done: int, of: int) -> None:
@@ -92,7 +92,7 @@ def test_wildcards_stand_for_no_folders(folder: Path, character: Character) -> N
 
 def test_what_is_left_out_must_be_there(folder: Path, character: Character) -> None:
     wrong = plan("walks/*.npz", leave_out=["walks/walk_03.npz"])
-    with pytest.raises(SpecError, match=r"'walks/walk_03.npz' is none of the 4.*walks/walk_3.npz"):
+    with pytest.raises(SpecError, match=r"03.npz' is not one of the 4.*walks/walk_3.npz"):
         build_graph(wrong, [folder], folder, character, quiet)
     nothing = plan("walks/walk_3.npz", leave_out=["walks/walk_3.npz"])
     with pytest.raises(SpecError, match="leave_out names all motions"):
@@ -114,8 +114,8 @@ def test_what_is_missing_is_told(folder: Path, character: Character, name: str) 
 
 
 def test_built_in_motion_needs_no_folder(character: Character, tmp_path: Path) -> None:
-    path = find_plan("builtin")
-    graph = build_graph(read_plan(path), [], path.parent, character, quiet)
+    path = find_graph_spec("builtin")
+    graph = build_graph(read_graph_spec(path), [], path.parent, character, quiet)
     assert graph.database.credits == ()
     assert all(clip.name.startswith("built-in: ") for clip in graph.database.clips)
     assert len(graph.frames) > 0
@@ -123,8 +123,8 @@ def test_built_in_motion_needs_no_folder(character: Character, tmp_path: Path) -
 
 @pytest.mark.mocap
 def test_walking(motions_folder: Path, character: Character) -> None:
-    path = find_plan("walking")
-    graph = build_graph(read_plan(path), [motions_folder], path.parent, character, quiet)
+    path = find_graph_spec("walking")
+    graph = build_graph(read_graph_spec(path), [motions_folder], path.parent, character, quiet)
     assert len(graph.database.clips) > 80
     assert graph.counts.component_frames > 0.7 * len(graph.database)
     assert any("Movement Research Lab" in line for line in graph.database.credits)

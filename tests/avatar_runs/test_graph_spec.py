@@ -2,13 +2,13 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.avatar_runs.graph_spec import find_plan, plan_names, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, graph_spec_names, read_graph_spec
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.support.errors import SpecError, UnknownNameError
 
 
 def written(folder: Path, text: str) -> Path:
-    path = folder / "plan.toml"
+    path = folder / "spec.toml"
     path.write_text(text)
     return path
 
@@ -23,10 +23,10 @@ motion = "builtin:walk"
 
 
 def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
-    plan = read_plan(written(tmp_path, SMALL))
-    assert plan.graph.config() == GraphConfig()
-    assert plan.graph.world == "flat"
-    assert plan.motion[0].motion == "builtin:walk"
+    spec = read_graph_spec(written(tmp_path, SMALL))
+    assert spec.graph.config() == GraphConfig()
+    assert spec.graph.world == "flat"
+    assert spec.motion[0].motion == "builtin:walk"
 
 
 def test_settings(tmp_path: Path) -> None:
@@ -35,7 +35,7 @@ def test_settings(tmp_path: Path) -> None:
         'name = "small"\nfps = 30\nmirrored = true\ncoordinates = "blocks"\nsigma = 0.2\n'
         "contact_change = false\nblend_s = 0.2",
     )
-    config = read_plan(written(tmp_path, said)).graph.config()
+    config = read_graph_spec(written(tmp_path, said)).graph.config()
     assert (config.fps, config.mirrored, config.sigma) == (30.0, True, 0.2)
     assert config.coordinates is Coordinates.BLOCKS
     assert config.keeps_local_maxima
@@ -64,25 +64,25 @@ def test_settings(tmp_path: Path) -> None:
         ("[graph]", "[graph", "not valid TOML"),
     ],
 )
-def test_mistakes_are_told(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_mistakes(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(SpecError, match=said):
-        read_plan(written(tmp_path, SMALL.replace(old, new, 1)))
+        read_graph_spec(written(tmp_path, SMALL.replace(old, new, 1)))
 
 
-def test_a_plan_without_motions_is_told(tmp_path: Path) -> None:
+def test_a_spec_without_motions(tmp_path: Path) -> None:
     text = 'motion = []\n[graph]\nname = "small"\n'
     with pytest.raises(SpecError, match=r"motion: expected at least 1 table \[\[motion\]\], got 0"):
-        read_plan(written(tmp_path, text))
+        read_graph_spec(written(tmp_path, text))
 
 
-@pytest.mark.parametrize("name", plan_names())
-def test_plans_that_come_with_dynresp_are_right(name: str) -> None:
-    plan = read_plan(find_plan(name))
-    assert plan.graph.name
-    assert plan.motion
+@pytest.mark.parametrize("name", graph_spec_names())
+def test_specs_that_come_with_dynresp_are_right(name: str) -> None:
+    spec = read_graph_spec(find_graph_spec(name))
+    assert spec.graph.name
+    assert spec.motion
 
 
-def test_plans_are_found_by_name_or_file() -> None:
-    assert find_plan("some/plan.toml") == Path("some/plan.toml")
-    with pytest.raises(UnknownNameError, match=r"unknown graph plan 'walkin'.*'walking'"):
-        find_plan("walkin")
+def test_specs_are_found_by_name_or_file() -> None:
+    assert find_graph_spec("some/spec.toml") == Path("some/spec.toml")
+    with pytest.raises(UnknownNameError, match=r"unknown graph spec 'walkin'.*'walking'"):
+        find_graph_spec("walkin")

@@ -7,8 +7,8 @@ from types import FrameType
 import numpy as np
 import pytest
 
-from dynresp.avatar_runs.video_run import VideoAsked, watch_outing
-from dynresp.avatar_runs.visible_cluster_file import Sight
+from dynresp.avatar_runs.video_run import VideoSettings, video_run
+from dynresp.avatar_runs.visible_cluster_file import VideoModel
 from dynresp.cli.graph_watch import Stop
 from dynresp.locomotion.vision.action_recognition import Recogniser
 from dynresp.locomotion.vision.segmentation import Picture
@@ -19,11 +19,11 @@ from tests.locomotion.vision.samples import acting_forest
 
 
 @pytest.fixture(scope="module")
-def sight(character: Character) -> Sight:
+def model(character: Character) -> VideoModel:
     forest = acting_forest(character)
     database = forest.graph.database
     table = ViewTable.of(database, character=character)
-    return Sight(forest, table, Recogniser.trained(database, table, forest.clusters.labels))
+    return VideoModel(forest, table, Recogniser.trained(database, table, forest.clusters.labels))
 
 
 def shown(count: int) -> Iterator[Picture]:
@@ -38,16 +38,16 @@ def shown(count: int) -> Iterator[Picture]:
 
 
 @pytest.fixture
-def watch(sight: Sight, character: Character) -> Callable[..., list[str]]:
+def watch(model: VideoModel, character: Character) -> Callable[..., list[str]]:
     def run(
         count: int, length: int | None, seconds: float = 60.0, fps: float = 30.0,
         stop: Stop | None = None,
     ) -> list[str]:  # fmt: skip
         stop = stop or Stop()
-        asked = VideoAsked("mine.avi", fps, seconds, length, 0, stop, stop.ended)
+        settings = VideoSettings("mine.avi", fps, seconds, length, 0, stop, stop.ended)
         remarks: list[str] = []
-        watch_outing(
-            sight.forest.graph, character, sight, shown(count), asked, 30.0, lambda *_: None,
+        video_run(
+            model.forest.graph, character, model, shown(count), settings, 30.0, lambda *_: None,
             remarks.append,
         )  # fmt: skip
         return remarks

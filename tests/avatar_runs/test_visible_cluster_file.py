@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from dynresp.avatar_runs import visible_cluster_file
-from dynresp.avatar_runs.visible_cluster_file import FORMAT, Sight, load_actions, save_actions
+from dynresp.avatar_runs.visible_cluster_file import FORMAT, VideoModel, load_actions, save_actions
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
 from dynresp.support.errors import GraphFileError
@@ -27,15 +27,15 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def sight(
     graph: MotionGraph, character: Character, cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> Sight:
+) -> VideoModel:
     monkeypatch.setenv("DYNRESP_CACHE", str(cache))
-    return Sight.of(graph, character, 2, lambda *_: None, pytest.fail)
+    return VideoModel.of(graph, character, 2, lambda *_: None, pytest.fail)
 
 
 def test_what_is_read_is_what_was_learnt(
-    sight: Sight, graph: MotionGraph, character: Character
+    sight: VideoModel, graph: MotionGraph, character: Character
 ) -> None:
-    again = Sight.of(graph, character, 2, lambda *_: pytest.fail("made anew"), pytest.fail)
+    again = VideoModel.of(graph, character, 2, lambda *_: pytest.fail("made anew"), pytest.fail)
     np.testing.assert_array_equal(again.table.rows, sight.table.rows)
     a, b = again.forest.clusters, sight.forest.clusters
     for name in ("labels", "log_probabilities", "examples"):
@@ -49,20 +49,20 @@ def test_what_is_read_is_what_was_learnt(
 
 
 def test_another_bound_is_another_file(
-    sight: Sight, graph: MotionGraph, character: Character, cache: Path
+    sight: VideoModel, graph: MotionGraph, character: Character, cache: Path
 ) -> None:
     stages = []
-    Sight.of(graph, character, 3, lambda stage, *_: stages.append(stage), pytest.fail)
+    VideoModel.of(graph, character, 3, lambda stage, *_: stages.append(stage), pytest.fail)
     assert set(stages) == {"telling actions apart"}
     assert len(list((cache / "sight").glob("actions-*.npz"))) == 2
 
 
 def test_another_version_of_the_clustering_is_another_file(
-    sight: Sight, graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
+    sight: VideoModel, graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(visible_cluster_file, "CLUSTERING_VERSION", 0)
     stages = []
-    Sight.of(graph, character, 2, lambda stage, *_: stages.append(stage), pytest.fail)
+    VideoModel.of(graph, character, 2, lambda stage, *_: stages.append(stage), pytest.fail)
     assert set(stages) == {"telling actions apart"}
 
 
@@ -92,7 +92,7 @@ def test_another_version_of_the_clustering_is_another_file(
     ],
 )
 def test_files_that_make_no_sense(
-    sight: Sight, graph: MotionGraph, tmp_path: Path, name: str, value: np.ndarray, said: str
+    sight: VideoModel, graph: MotionGraph, tmp_path: Path, name: str, value: np.ndarray, said: str
 ) -> None:
     path = tmp_path / "actions.npz"
     save_actions(path, "mine", sight.forest.clusters, sight.recogniser)
@@ -104,7 +104,9 @@ def test_files_that_make_no_sense(
         load_actions(path, "mine", graph, sight.table)
 
 
-def test_infinite_weights_make_no_sense(sight: Sight, graph: MotionGraph, tmp_path: Path) -> None:
+def test_infinite_weights_make_no_sense(
+    sight: VideoModel, graph: MotionGraph, tmp_path: Path
+) -> None:
     path = tmp_path / "actions.npz"
     first, last = sight.recogniser.weights
     wrong = replace(sight.recogniser, weights=(np.full_like(first, np.inf), last))

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from dynresp.avatar_runs.world_setup import PLAYGROUND, TERRAIN, play_in_world, refuse_blocks
+from dynresp.avatar_runs.world_setup import PLAYGROUND, TERRAIN, play_in_world, refuse_terrain
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import random_walk
@@ -19,12 +19,12 @@ def test_each_world_is_played_in_its_own_way(character: Character) -> None:
     path = random_walk(flat, 40, np.random.default_rng(0))
     played = play_in_world(flat, character, path, 30.0)
     assert (played.motion.poses == compose(flat, character, path, fps=30.0).motion.poses).all()
-    refuse_blocks(flat)
+    refuse_terrain(flat)
     terrain = of_world(flat, TERRAIN)
-    with pytest.raises(UsageError, match="without --choose, --choices and --balls"):
+    with pytest.raises(UsageError, match="need blocks to step on"):
         play_in_world(terrain, character, path, 30.0)
     with pytest.raises(UsageError, match="graph sketch"):
-        refuse_blocks(terrain)
+        refuse_terrain(terrain)
     hands = np.zeros((len(walk), 4), dtype=bool)
     hands[:, :2] = walk.contacts
     config = GraphConfig(coordinates=Coordinates.FIXED, sigma=10.0)

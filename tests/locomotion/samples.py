@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from dynresp.avatar_runs.graph_building import build_graph
-from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, read_graph_spec
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.builtin import load_builtin
@@ -33,5 +33,5 @@ def walking_graph(character: Character, **changes: object) -> MotionGraph:
 @functools.cache
 def planned_graph(name: str, folder: Path, character: Character) -> MotionGraph:
     """The graph of a plan that comes with the product, of real motion capture; built once."""
-    path = find_plan(name)
-    return build_graph(read_plan(path), [folder], path.parent, character, lambda *_: None)
+    path = find_graph_spec(name)
+    return build_graph(read_graph_spec(path), [folder], path.parent, character, lambda *_: None)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynresp.avatar_runs.graph_building import build_graph
-from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, read_graph_spec
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.motion.character import Character
@@ -17,8 +17,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.mocap]
 
 
 def built(name: str, folder: Path, character: Character) -> MotionGraph:
-    path = find_plan(name)
-    return build_graph(read_plan(path), [folder], path.parent, character, lambda *_: None)
+    path = find_graph_spec(name)
+    return build_graph(read_graph_spec(path), [folder], path.parent, character, lambda *_: None)
 
 
 def test_every_drawn_terrain_is_crossed_and_every_stance_is_on_its_block(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dynresp.avatar_runs.graph_building import build_graph
-from dynresp.avatar_runs.graph_spec import find_plan, read_plan
+from dynresp.avatar_runs.graph_spec import find_graph_spec, read_graph_spec
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
@@ -36,11 +36,13 @@ class Walk:
     scope="module", params=[pytest.param("walking", marks=pytest.mark.mocap), "builtin"]
 )
 def walk(request: pytest.FixtureRequest) -> Walk:
-    plan = find_plan(request.param)
+    plan = find_graph_spec(request.param)
     folders: list[Path] = []
     if request.param != "builtin":
         folders = [request.getfixturevalue("motions_folder")]
-    graph = build_graph(read_plan(plan), folders, plan.parent, default_character(), lambda *_: None)
+    graph = build_graph(
+        read_graph_spec(plan), folders, plan.parent, default_character(), lambda *_: None
+    )
     rng = np.random.default_rng(1)
     random_walk(graph, 10, rng)
     path = random_walk(graph, FRAMES, rng)
