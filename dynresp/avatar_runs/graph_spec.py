@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, PlainValidator
 
-from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.locomotion.graph.graph_config import LIMITS, Coordinates, GraphConfig
 from dynresp.locomotion.worlds.terrain import LEVEL_M
 from dynresp.motion.sources.collection import GRAPHS
 from dynresp.specs.shared_tables import MotionCut, Strict
@@ -28,26 +28,31 @@ _COORDINATES: dict[str, str] = {
 }
 
 
-class GraphTable(Strict):
-    """`[graph]`: its name, its world, and settings.
+def _within_limits(name: str) -> PlainValidator:
+    """For a setting that is a number: the limits of `GraphConfig`."""
+    return fixed(*LIMITS[name])
 
-    What is left out is as in `GraphConfig`, but for the coordinates, which go with the world.
+
+class GraphTable(Strict):
+    """`[graph]`: its name, its world, and settings, which `GraphConfig` describes.
+
+    Left out, a setting has the default of `GraphConfig`; `coordinates` depends on the world.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
     world: WorldName = "flat"
-    fps: Annotated[float | None, fixed(1.0, 240.0, "frames a second")] = None
+    fps: Annotated[float | None, _within_limits("fps")] = None
     mirrored: bool = False
     coordinates: Literal["relative", "fixed", "blocks"] | None = None
     contact_change: bool | None = None
-    slip_m: Annotated[float | None, fixed(0.0, 10.0, "m")] = None
+    slip_m: Annotated[float | None, _within_limits("slip_m")] = None
     local_maxima: bool | None = None
-    sigma: Annotated[float | None, fixed(1e-6, 1e3)] = None
-    least_probability: Annotated[float | None, fixed(1e-9, 0.999)] = None
-    velocity_weight: Annotated[float | None, fixed(0.0, 100.0)] = None
-    stutter_s: Annotated[float | None, fixed(0.0, 10.0, "s")] = None
-    blend_s: Annotated[float | None, fixed(0.01, 10.0, "s")] = None
-    blend_rate_s: Annotated[float | None, fixed(0.01, 10.0, "s")] = None
+    sigma: Annotated[float | None, _within_limits("sigma")] = None
+    least_probability: Annotated[float | None, _within_limits("least_probability")] = None
+    velocity_weight: Annotated[float | None, _within_limits("velocity_weight")] = None
+    stutter_s: Annotated[float | None, _within_limits("stutter_s")] = None
+    blend_s: Annotated[float | None, _within_limits("blend_s")] = None
+    blend_rate_s: Annotated[float | None, _within_limits("blend_rate_s")] = None
 
     def config(self) -> GraphConfig:
         """The settings.

@@ -1,9 +1,16 @@
+import dataclasses
+import itertools
 from pathlib import Path
 
 import pytest
 
-from dynresp.avatar_runs.graph_spec import find_graph_spec, graph_spec_names, read_graph_spec
-from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
+from dynresp.avatar_runs.graph_spec import (
+    GraphTable,
+    find_graph_spec,
+    graph_spec_names,
+    read_graph_spec,
+)
+from dynresp.locomotion.graph.graph_config import LIMITS, Coordinates, GraphConfig
 from dynresp.support.errors import SpecError, UnknownNameError
 
 
@@ -86,3 +93,24 @@ def test_specs_are_found_by_name_or_file() -> None:
     assert find_graph_spec("some/spec.toml") == Path("some/spec.toml")
     with pytest.raises(UnknownNameError, match=r"unknown graph spec 'walkin'.*'walking'"):
         find_graph_spec("walkin")
+
+
+def test_the_documented_settings_are_those_of_graphs() -> None:
+    page = Path(__file__).parents[2] / "docs" / "locomotion.md"
+    lines = page.read_text(encoding="utf-8").splitlines()
+    begin = lines.index("| key | default | range | meaning |") + 2
+    rows = list(itertools.takewhile(lambda line: line.startswith("|"), lines[begin:]))
+    cells = [[cell.strip() for cell in row.split("|")] for row in rows]
+    documented = {row[1].strip("`"): (row[2], row[3]) for row in cells}
+    keys = set(GraphTable.model_fields) - {"name", "world"}
+    assert set(documented) == keys
+    # The size of blocks is that of the recorded terrain.
+    settings = {field.name: field.default for field in dataclasses.fields(GraphConfig)}
+    assert set(settings) == keys | {"block_m", "block_height_m"}
+    for name, (default, limits) in documented.items():
+        if name in LIMITS:
+            assert float(default) == settings[name]
+            assert limits == f"{LIMITS[name].low:g} to {LIMITS[name].high:g}"
+        else:
+            assert not limits
+            assert default.startswith("by ") or default == f"`{str(settings[name]).lower()}`"

@@ -23,10 +23,10 @@ from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.footprints import body_arrays, footprints
 from dynresp.locomotion.worlds.paths import window_m
-from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
+from dynresp.support.checks import check_numbers
 from dynresp.support.errors import UsageError
 
 FARTHEST_AHEAD_M = 100.0

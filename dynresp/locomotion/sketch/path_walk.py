@@ -16,9 +16,9 @@ from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.path_planning import PlanningConfig
 from dynresp.locomotion.worlds.paths import distances_to, resampled
-from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
+from dynresp.support.checks import check_numbers
 from dynresp.support.errors import DynrespError, UsageError
 from dynresp.support.progress import Progress
 

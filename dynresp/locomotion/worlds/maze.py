@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
-from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.checks import check_numbers
 from dynresp.support.errors import UsageError
 
 

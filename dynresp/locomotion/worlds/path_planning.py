@@ -10,9 +10,9 @@ import numpy.typing as npt
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.paths import as_place, resampled
-from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IndexArray
+from dynresp.support.checks import check_numbers
 from dynresp.support.errors import DynrespError, UsageError
 
 # Steps to half of the eight neighbours of a cell; the other half are the same ways back.

@@ -23,11 +23,11 @@ from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.random_walk import check_in_component
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled, window_m
-from dynresp.locomotion.worlds.settings import check_numbers
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import LongArray
+from dynresp.support.checks import check_numbers
 from dynresp.support.errors import UsageError
 
 # Distance of the points of a path [m].

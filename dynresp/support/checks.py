@@ -1,0 +1,67 @@
+"""Checks of numbers that a user gives in Python."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from numbers import Integral, Real
+from typing import Any
+
+from dynresp.support.errors import UsageError
+
+LARGEST = sys.float_info.max
+"""The largest float: whatever is within plus or minus this is finite."""
+
+
+def check_number(
+    name: str,
+    value: object,
+    low: float = -LARGEST,
+    high: float = LARGEST,
+    unit: str = "",
+    whole: bool = False,
+) -> None:
+    """Refuse what is not a finite number, or is out of range.
+
+    Args:
+        name: What the number is called in the message.
+        value: What was given.
+        low: The least number allowed.
+        high: The largest.
+        unit: Unit of the number, for the message.
+        whole: Whether it must be a whole number.
+
+    Raises:
+        UsageError: It is not such a number; the message says what was given and expected.
+    """
+    expected = "a whole number" if whole else "a number"
+    if not isinstance(value, Integral if whole else Real) or isinstance(value, bool):
+        raise UsageError(f"{name} must be {expected}, got {shown(value)!r}")
+    # Compared, not converted: that fails on whole numbers beyond a float. NaN fails, too.
+    if not low <= value <= high:  # type: ignore[operator]
+        limits = f"from {low:g} to {high:g}" if high < LARGEST else f"{low:g} or more, and finite"
+        limits = limits if low > -LARGEST else "finite"
+        raise UsageError(f"{name} must be {limits}{unit and f' {unit}'}, got {shown(value)}")
+
+
+def check_numbers(settings: Any) -> None:
+    """Refuse a dataclass whose fields of type `float` or `int` are not finite numbers.
+
+    Args:
+        settings: The dataclass's object.
+
+    Raises:
+        UsageError: A field is not such a number; the message names it.
+    """
+    for field in dataclasses.fields(settings):
+        if str(field.type) in ("float", "int"):
+            value = getattr(settings, field.name)
+            check_number(field.name, value, whole=str(field.type) == "int")
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it: at most 40 characters."""
+    try:
+        return str(value)[:40]
+    except ValueError:  # It has more digits than Python is willing to write.
+        return "a number with thousands of digits"
