@@ -66,6 +66,11 @@ def given_answers(answers: Iterable[int | None]) -> Pick:
     return pick
 
 
+def find_forest(graph: MotionGraph, character: Character) -> ClusterForest:
+    """Find the clusters of a graph, between which `choice_run` offers actions."""
+    return ClusterForest(graph, Clusters.of(graph, character=character))
+
+
 def choice_run(
     graph: MotionGraph,
     character: Character,
@@ -73,6 +78,7 @@ def choice_run(
     seconds: float = 20.0,
     seed: int = 0,
     fps: float = 30.0,
+    forest: ClusterForest | None = None,
 ) -> AvatarRun:
     """Walk by choice.
 
@@ -83,6 +89,7 @@ def choice_run(
         seconds: How long it walks [s]; the last action is played to its end.
         seed: Seed of where it begins, and of what it does without a pick.
         fps: Frame rate of the motion [1/s].
+        forest: Clusters of the graph, to find them once for several runs; None to find them here.
 
     Returns:
         The run. Its result folder has also options.png, the actions that were offered last.
@@ -100,7 +107,7 @@ def choice_run(
         >>> content = run.save("choices", video=False)
     """
     refuse_terrain(graph)
-    forest = ClusterForest(graph, Clusters.of(graph, character=character))
+    forest = forest or find_forest(graph, character)
     rng = np.random.default_rng(seed)
     start = int(rng.choice(graph.frames))
     control, playback = ChoiceControl(graph, start, rng), Playback(graph, start)

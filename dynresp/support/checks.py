@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
+from collections.abc import Callable
 from numbers import Integral, Real
 from typing import Any
 
@@ -36,12 +38,16 @@ def check_number(
     """
     expected = "a whole number" if whole else "a number"
     if not isinstance(value, Integral if whole else Real) or isinstance(value, bool):
-        raise UsageError(f"{name} must be {expected}, got {shown(value)!r}")
-    # Compared, not converted: that fails on whole numbers beyond a float. NaN fails, too.
-    if not low <= value <= high:  # type: ignore[operator]
+        raise UsageError(f"{name} must be {expected}, got {_shown(repr, value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    # NaN fails this, too.
+    if not low <= number <= high:
         limits = f"from {low:g} to {high:g}" if high < LARGEST else f"{low:g} or more, and finite"
         limits = limits if low > -LARGEST else "finite"
-        raise UsageError(f"{name} must be {limits}{unit and f' {unit}'}, got {shown(value)}")
+        raise UsageError(f"{name} must be {limits}{unit and f' {unit}'}, got {_shown(str, value)}")
 
 
 def check_numbers(settings: Any) -> None:
@@ -59,9 +65,9 @@ def check_numbers(settings: Any) -> None:
             check_number(field.name, value, whole=str(field.type) == "int")
 
 
-def shown(value: object) -> str:
-    """A value as a message shows it: at most 40 characters."""
+def _shown(write: Callable[[object], str], value: object) -> str:
+    """A value as a message shows it: at most 60 characters."""
     try:
-        return str(value)[:40]
+        return write(value)[:60]
     except ValueError:  # It has more digits than Python is willing to write.
         return "a number with thousands of digits"

@@ -1,9 +1,9 @@
-"""A playground to climb, swing and hang in: its bars, and what holds on to them.
+"""A playground to climb, swing and hang in: its bars, and contacts of hands and feet with them.
 
-Twelve clips of the CMU database (subject 1) were recorded on one piece of equipment, and in one
-world: hands and feet come to the same places in clip after clip. What stood there is not in the
-files. The bars of `recorded_playground` are measured from where slow hands and feet were, after
-retargeting; they are right to some 5 cm, and what nobody touched is missing.
+Twelve clips of the CMU database (subject 1) were recorded on the same equipment in one world: hands
+and feet come to the same places in clip after clip. The files do not describe the equipment. The
+bars of `recorded_playground` were measured from the places of slow hands and feet, after
+retargeting; they are right to some 5 cm, and bars that nobody touched are missing.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class Bar:
     """A round bar.
 
     Attributes:
-        name: What it is.
-        start: Where it begins [m].
-        stop: Where it ends [m].
+        name: Its name.
+        start: One end [m].
+        stop: The other end [m].
         radius: Its radius [m].
     """
 
@@ -93,7 +93,7 @@ class Playground:
         bars: The bars.
 
     Raises:
-        UsageError: Two bars have one name, or a number makes no sense.
+        UsageError: Two bars have the same name, an end is not finite, or a radius is not above 0.
     """
 
     bars: tuple[Bar, ...]
@@ -102,7 +102,7 @@ class Playground:
         """Check the bars."""
         names = [bar.name for bar in self.bars]
         if len(set(names)) < len(names):
-            raise UsageError(f"bars need names of their own, got {', '.join(sorted(names))}")
+            raise UsageError(f"each bar needs a different name, got {', '.join(sorted(names))}")
         for bar in self.bars:
             if not (np.isfinite([*bar.start, *bar.stop]).all() and 0 < bar.radius < np.inf):
                 raise UsageError(
@@ -111,37 +111,26 @@ class Playground:
                 )
 
     def nearest(self, points: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
-        """The bar nearest to each of the points (..., 3): its index, and how far its axis is [m].
+        """The bar nearest to each of the points (..., 3): its index, and its axis' distance [m].
 
         Raises:
             UsageError: There are no bars.
         """
         if not self.bars:
-            raise UsageError("a playground without bars has none that is nearest; give it bars")
+            raise UsageError("this playground has no bars, so none is nearest; give it bars")
         distances = np.stack([bar.distance(points) for bar in self.bars])
         return distances.argmin(axis=0), distances.min(axis=0)
 
 
-@dataclass(frozen=True)
-class TouchConfig:
-    """When a hand or a foot holds on to a bar, or stands on the ground.
-
-    Attributes:
-        hand_reach: The middle of a hand is at most this far from a bar's axis [m],
-        hand_speed: and moves at most this fast [m/s]; hands slip along as their arms turn.
-        foot_reach: The same of the middle of a sole,
-        foot_speed: and its speed.
-    """
-
-    hand_reach: float = 0.13
-    hand_speed: float = 0.8
-    foot_reach: float = 0.10
-    foot_speed: float = 0.5
+# A hand holds a bar if its middle is at most this far from the bar's axis [m] and at most this fast
+# [m/s]: hands slip along as their arms turn. The same of the middle of a sole.
+_HAND_REACH_M, _HAND_SPEED = 0.13, 0.8
+_FOOT_REACH_M, _FOOT_SPEED = 0.10, 0.5
 
 
 @functools.cache
 def recorded_playground() -> Playground:
-    """The equipment on which CMU's subject 1 was recorded, as far as the clips show it."""
+    """The bars on which CMU's subject 1 was recorded, as far as the clips show them."""
     return Playground(tuple(Bar(*row) for row in _RECORDED))
 
 
@@ -149,32 +138,29 @@ def playground_contacts(
     motion: Motion,
     character: Character,
     playground: Playground | None = None,
-    config: TouchConfig | None = None,
 ) -> BoolArray:
-    """What holds on to the playground, or stands on the ground, frame by frame.
+    """Which hands and feet hold a bar or stand on the ground, frame by frame.
 
     Args:
-        motion: In the world of the playground, as loaded with flat_floor=False.
-        character: Whose motion it is.
-        playground: The equipment, by default what CMU's subject 1 climbed on.
-        config: Thresholds.
+        motion: A motion in the world of the playground, loaded with flat_floor=False.
+        character: The character.
+        playground: The bars, by default `recorded_playground`.
 
     Returns:
         (frames, 4): left foot, right foot, left hand, right hand.
     """
     playground = recorded_playground() if playground is None else playground
-    config = config or TouchConfig()
     states = character.kinematics(motion.poses)
     corners = sole_corners(character, states)
     low = corners[..., 2] <= CONTACT_HEIGHT
     standing = (low & (speeds(corners, motion.fps) <= CONTACT_SPEED)).any(axis=2)
     hands, soles = palms(character, states), corners.mean(axis=2)
     if playground.bars:
-        standing |= (playground.nearest(soles)[1] <= config.foot_reach) & (
-            speeds(soles, motion.fps) <= config.foot_speed
+        standing |= (playground.nearest(soles)[1] <= _FOOT_REACH_M) & (
+            speeds(soles, motion.fps) <= _FOOT_SPEED
         )
-        holding = (playground.nearest(hands)[1] <= config.hand_reach) & (
-            speeds(hands, motion.fps) <= config.hand_speed
+        holding = (playground.nearest(hands)[1] <= _HAND_REACH_M) & (
+            speeds(hands, motion.fps) <= _HAND_SPEED
         )
     else:
         holding = np.zeros(hands.shape[:2], dtype=bool)

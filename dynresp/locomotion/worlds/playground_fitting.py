@@ -1,18 +1,18 @@
-"""From a walk through a playground to a motion whose hands hold on to its bars, and a check.
+"""Fitting hands to the bars of a playground, and measuring how they hold.
 
-Where a graph's walk goes from one clip to another, what is played is blended, and a hand that holds
-a bar slips. So after the feet, hands are fitted (constraint-based, as feet are: Lee et al. 2002,
-4.1.1). While a hand holds, one point of it stays at one point of the bar, about which the hand may
-turn. Both are read from the recorded frames; those count the more, the less of a blend is left in
-them. Where the clips before and after a jump hold different bars, the hand lets go of the one and
-takes the other. Between holds the correction fades, the root follows the hands, and the arms and
-legs follow by two-bone inverse kinematics.
+When a walk jumps from one clip to another, the motion is blended, and a hand on a bar slips. So
+hands are fitted after the feet (by constraints, as feet are: Lee et al. 2002, 4.1.1). While a
+hand holds, one point of it stays at one point of the bar, and the hand may turn about it. Both
+points come from the recorded frames; a frame counts less while a blend goes on. If the clips before
+and after a jump hold different bars, the hand lets go of the first and takes the second. Between
+holds the correction fades. The root follows the hands, and arms and legs follow by two-bone inverse
+kinematics.
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -36,46 +36,25 @@ from dynresp.support import smoothing
 from dynresp.support.errors import UsageError
 from dynresp.support.runs import runs
 
-# A frame in the middle of a blend still tells a little where a hand holds.
-_LEAST_WEIGHT = 1e-3
-# A point of a hand is no farther from its middle than this [m].
+GRIP_M = 0.036
+"""Largest distance from the middle of a hand to the surface of the bar that it holds [m]."""
+REGRIP_S = 0.3
+"""Time in which a hand goes to another bar, after a jump to a clip that holds another one [s]."""
+
+# Longest time in which a correction fades after a hand lets go, and grows before it takes hold [s].
+_EASE_S = 0.4
+# Time in which the root follows the hands [s].
+_FOLLOW_S = 0.5
+# Part of its length to which an arm or a leg is stretched, unless the walk stretches it more.
+_STRAIGHT = 0.99
+# Weight of a frame in the middle of a blend, beside 1 for a recorded one.
+_MIN_WEIGHT = 1e-3
+# Largest distance of a point of a hand from its middle [m].
 _HAND_M = 0.06
 # Corrections below this are rounding [m].
-_NOTHING = 1e-9
-# How often the root is drawn to where all that holds is within reach.
-_DRAWS = 12
-
-
-@dataclass(frozen=True)
-class HandFitConfig:
-    """How hands are put on bars.
-
-    Attributes:
-        hand_m: What a hand closes about is at most this far from the hand's middle, besides the
-            bar's radius [m].
-        ease_s: Time over which a correction fades when a hand lets go, and grows before it
-            takes hold, at most [s].
-        regrip_s: Time in which a hand goes from bar to bar after a jump between clips that hold
-            different ones [s].
-        follow_s: Time over which the root follows the hands [s].
-        straight: Part of its length to which an arm or a leg is stretched, unless it is played
-            straighter.
-
-    Raises:
-        UsageError: A number is not above 0.
-    """
-
-    hand_m: float = 0.036
-    ease_s: float = 0.4
-    regrip_s: float = 0.3
-    follow_s: float = 0.5
-    straight: float = 0.99
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for item in fields(self):
-            if not 0.0 < getattr(self, item.name) < np.inf:
-                raise UsageError(f"{item.name} must be above 0, got {getattr(self, item.name)}")
+_ROUNDING_M = 1e-9
+# Most steps in which the root is moved until all holds are within reach.
+_ROOT_STEPS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +80,11 @@ class Hold:
 
 @dataclass(frozen=True, eq=False)
 class Grips:
-    """How hands hold on, hold by hold.
+    """How well hands hold, hold by hold.
 
     Attributes:
-        slip: (h,) how far the point of the hand that keeps stillest comes from its mean place, at
-            the worst moment [m].
-        off_bar: (h,) how far the middle of the hand is from the bar's axis, the worst moment [m].
+        slip: (h,) largest distance of the stillest point of the hand from its mean place [m].
+        off_bar: (h,) largest distance of the middle of the hand from the bar's axis [m].
     """
 
     slip: FloatArray
@@ -119,7 +97,6 @@ def compose_on_playground(
     frames: npt.ArrayLike,
     fps: float | None = None,
     playground: Playground | None = None,
-    config: HandFitConfig | None = None,
 ) -> Composition:
     """Play a walk through a playground, with hands on its bars.
 
@@ -128,8 +105,7 @@ def compose_on_playground(
         character: The character.
         frames: (k,) a walk; two frames or more.
         fps: Frame rate of the motion, by default the graph's.
-        playground: The bars, by default what CMU's subject 1 climbed on.
-        config: How hands are fitted.
+        playground: The bars, by default `recorded_playground`.
 
     Returns:
         As `compose`; `motion` is fitted.
@@ -137,12 +113,11 @@ def compose_on_playground(
     Raises:
         UsageError: The graph is in other coordinates, or has no contacts of hands.
     """
-    config = config or HandFitConfig()
     playground = playground or recorded_playground()
     played = compose(graph, character, frames, fps=fps)
     motion = played.motion
-    held = find_holds(graph, character, played, playground, config)
-    poses = _hold_on(character, motion, held, config)
+    held = find_holds(graph, character, played, playground)
+    poses = _hold_on(character, motion, held)
     fitted = Motion(poses, motion.fps, "walk through a playground", motion.contacts)
     return Composition(played.frames, fitted, played.jumps, played.placements, played.unfitted)
 
@@ -152,19 +127,17 @@ def find_holds(
     character: Character,
     played: Composition,
     playground: Playground | None = None,
-    config: HandFitConfig | None = None,
 ) -> list[Hold]:
-    """When and where the hands of a composed walk hold on.
+    """Find when and where the hands of a composed walk hold.
 
     Args:
-        graph: Whose walk it is.
+        graph: The graph of the walk.
         character: The character.
-        played: What was composed.
-        playground: The bars, by default what CMU's subject 1 climbed on.
-        config: How hands are fitted.
+        played: The composed walk.
+        playground: The bars, by default `recorded_playground`.
 
     Returns:
-        The holds, those of the left hand first, each hand's in the order of time.
+        The holds: first those of the left hand; of each hand in the order of time.
 
     Raises:
         UsageError: The graph is in other coordinates, or has no contacts of hands.
@@ -176,7 +149,6 @@ def find_holds(
             f"{graph.config.coordinates.value} and {database.contacts.shape[1]}; build it with "
             "Coordinates.FIXED and playground_contacts"
         )
-    config = config or HandFitConfig()
     playground = playground or recorded_playground()
     path, fps = played.frames, played.motion.fps
     step, part = steps_at_rate(len(path), rate, fps)
@@ -186,7 +158,7 @@ def find_holds(
     middles = palms(character, states)
     bars, _ = playground.nearest(middles)
     weights = _weights(played.jumps, len(path), max(1, round(graph.config.blend_s * rate)))
-    cut = max(1, round(config.regrip_s * fps))
+    cut = max(1, round(REGRIP_S * fps))
     holds = []
     for hand, side in enumerate(FEET):
         forearm = character.body(f"{side}_forearm")
@@ -200,7 +172,7 @@ def find_holds(
                 back = rotations.conjugate(states.quaternions[knots, forearm])
                 away = weight @ rotations.rotate(back, held - middles[knots, hand])
                 far = float(np.linalg.norm(away))
-                away *= min(1.0, (config.hand_m + bar.radius) / max(far, 1e-9))
+                away *= min(1.0, (GRIP_M + bar.radius) / max(far, 1e-9))
                 number = playground.bars.index(bar)
                 holds.append(Hold(hand, start + first, start + last, number, place, PALM + away))
     return holds
@@ -209,13 +181,13 @@ def find_holds(
 def grips(
     character: Character, motion: Motion, holds: list[Hold], playground: Playground | None = None
 ) -> Grips:
-    """Check how hands hold on; told from the poses alone, whatever point was fitted.
+    """Measure how hands hold, from the poses alone.
 
     Args:
         character: The character.
         motion: The motion.
         holds: When and which bars; see `find_holds`.
-        playground: The bars, by default what CMU's subject 1 climbed on.
+        playground: The bars, by default `recorded_playground`.
     """
     playground = playground or recorded_playground()
     states = character.kinematics(motion.poses)
@@ -230,13 +202,13 @@ def grips(
 
 
 def _weights(jumps: npt.NDArray[np.intp], n: int, blend: int) -> FloatArray:
-    """How much each frame of a walk tells: little while a blend goes on (n,)."""
+    """Weight (n,) of each frame of a walk: small while a blend goes on."""
     frames = np.arange(n)
     before = np.searchsorted(jumps, frames, side="right") - 1
     weight = np.ones(n)
     inside = before >= 0
     weight[inside] = rotations.ease((frames[inside] - jumps[before[inside]]) / blend) ** 2
-    return weight + _LEAST_WEIGHT
+    return weight + _MIN_WEIGHT
 
 
 def _one_bar(bars: npt.NDArray[np.intp], cut: int) -> list[tuple[int, int]]:
@@ -246,16 +218,14 @@ def _one_bar(bars: npt.NDArray[np.intp], cut: int) -> list[tuple[int, int]]:
     return [(a, b) for a, b in parts if b > a]
 
 
-def _hold_on(
-    character: Character, motion: Motion, holds: list[Hold], config: HandFitConfig
-) -> FloatArray:
+def _hold_on(character: Character, motion: Motion, holds: list[Hold]) -> FloatArray:
     """Poses (n, 59) with every hold in its place."""
     poses, n = np.array(motion.poses), len(motion)
     if not holds:
         return poses
     states = character.kinematics(poses)
-    ease = max(1, round(config.ease_s * motion.fps))
-    # Of the feet, then of the hands.
+    ease = max(1, round(_EASE_S * motion.fps))
+    # Two feet, then two hands.
     shifts, weights = np.zeros((n, 4, 3)), np.zeros((n, 4))
     grip, ends = np.zeros((n, 2, 3)), np.zeros((n, 2, 3))
     grip[:] = PALM
@@ -274,8 +244,8 @@ def _hold_on(
     ankles = legs.ankle_positions(character, states)
     feet = states.quaternions[:, [character.body(f"{side}_foot") for side in FEET]]
     tips = np.concatenate([ankles, ends], axis=1)
-    root = _root(character, states, tips, shifts, weights, motion.fps, config)
-    # What neither holds nor stands goes with the root.
+    root = _root(character, states, tips, shifts, weights, motion.fps)
+    # Feet and hands that are free go with the root.
     shifts += (1.0 - weights)[..., None] * root[:, None]
     poses[:, :3] += root
     poses = legs.place_ankles(character, poses, ankles + shifts[:, :2], feet)
@@ -283,7 +253,7 @@ def _hold_on(
 
 
 def _carry(grip: FloatArray, holds: list[Hold]) -> None:
-    """Which point of a hand is led (n, 3, in place): that of the nearest hold."""
+    """Set the gripping point of a hand (n, 3, in place) to that of the nearest hold."""
     for i, hold in enumerate(holds):
         first = 0 if i == 0 else (holds[i - 1].stop + hold.start) // 2
         last = len(grip) if i + 1 == len(holds) else (hold.stop + holds[i + 1].start) // 2
@@ -291,7 +261,7 @@ def _carry(grip: FloatArray, holds: list[Hold]) -> None:
 
 
 def _fade(shift: FloatArray, spans: list[tuple[int, int]], ease: int) -> FloatArray:
-    """Let a correction (n, 3, in place) fade between spans; how much each frame is held (n,)."""
+    """Let a correction (n, 3, in place) fade between spans; returns each frame's weight (n,)."""
     n = len(shift)
     weight = np.zeros(n)
     bounds = [(0, 0), *spans, (n, n)]
@@ -315,21 +285,19 @@ def _root(
     shifts: FloatArray,
     weights: FloatArray,
     fps: float,
-    config: HandFitConfig,
 ) -> FloatArray:
-    """How the root follows what holds (n, 3) [m], so that arms and legs reach.
+    """Shift (n, 3) [m] of the root that follows the holds, so that arms and legs reach them.
 
     Args:
         character: The character.
         states: Its bodies as played.
-        tips: (n, 4, 3) ankles, then what of the hands is led [m].
+        tips: (n, 4, 3) ankles, then gripping points of the hands [m].
         shifts: (n, 4, 3) their corrections [m].
-        weights: (n, 4) how much each is held.
+        weights: (n, 4) how firmly each is held, 0 to 1.
         fps: Frame rate [1/s].
-        config: How hands are fitted.
     """
     root = shifts.sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)[:, None]
-    half = max(1, round(0.5 * config.follow_s * fps))
+    half = max(1, round(0.5 * _FOLLOW_S * fps))
     root = smoothing.average(root, half)
     joints, reach = [], []
     for k, (upper, lower) in enumerate((("thigh", "shank"), ("upper_arm", "forearm"))):
@@ -337,15 +305,15 @@ def _root(
             first, second = (character.body(f"{side}_{part}") for part in (upper, lower))
             bones = np.linalg.norm(character.offsets[second])
             tip = tips[:, 2 * k + i] - states.positions[:, second]
-            longest = config.straight * (bones + np.linalg.norm(tip, axis=1))
+            longest = _STRAIGHT * (bones + np.linalg.norm(tip, axis=1))
             joints.append(states.positions[:, first])
             played = np.linalg.norm(tips[:, 2 * k + i] - joints[-1], axis=1)
             reach.append(np.maximum(longest, played))
     away = tips + shifts - np.stack(joints, axis=1)
     far = np.stack(reach, axis=1)
-    half_draw = max(1, round(0.25 * config.follow_s * fps))
-    for _ in range(_DRAWS):
-        # What is not held goes with the root.
+    half_draw = max(1, round(0.25 * _FOLLOW_S * fps))
+    for _ in range(_ROOT_STEPS):
+        # Feet and hands that are free go with the root.
         way = away - weights[..., None] * root[:, None]
         length = np.linalg.norm(way, axis=-1)
         short = weights * np.maximum(length - far, 0.0) / np.maximum(length, 1e-9)
@@ -367,7 +335,7 @@ def _place_hands(
         tip = elbow + rotations.rotate(world[:, forearm], grip[:, hand])
         # An elbow bends forward, a knee backward.
         lateral = rotations.rotate(world[:, upper], np.array([0.0, -1.0, 0.0]))
-        moved = np.linalg.norm(wanted[:, hand] - tip, axis=1) > _NOTHING
+        moved = np.linalg.norm(wanted[:, hand] - tip, axis=1) > _ROUNDING_M
         turns = legs.bend_turns(
             states.positions[moved, upper], elbow[moved], tip[moved], lateral[moved],
             wanted[moved, hand],
@@ -380,7 +348,7 @@ def _place_hands(
 
 
 def _stillest(middles: FloatArray, turns: FloatArray) -> float:
-    """How far the point of a hand that keeps stillest comes from its mean place [m].
+    """Largest distance of the stillest point of a hand from its mean place [m].
 
     Args:
         middles: (n, 3) the middle of the hand [m].

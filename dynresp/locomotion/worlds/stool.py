@@ -1,8 +1,8 @@
-"""A step stool on a level floor, and what one does with it (Lee et al. 2002, section 6).
+"""A step stool on a level floor, and motion on it (Lee et al. 2002, section 6).
 
-The paper's step stool was recorded for five minutes; no such recording is at hand here, so the
-motion is a built-in one. The stool is a cube with its middle at the origin: 0.32 m is as high as a
-tall step stool and a low seat, and as wide as two feet side by side and a foot's length need.
+The paper recorded five minutes with a step stool. There is no such recording here, so the motion is
+built in. The stool is a cube around the origin: 0.32 m is the height of a tall step stool or a low
+seat, and wide enough for two feet side by side and for the length of a foot.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dynresp.support.arrays import BoolArray
 SIDE_M = 0.32
 """Length, width and height of the stool [m]."""
 
-# How far the floor goes to all sides of the stool [m]: a step beyond where the motions go.
+# The floor ends this far from the stool's middle [m]: a step beyond the motions.
 _FLOOR = 2.5
 
 
@@ -37,17 +37,17 @@ def stool_world() -> World:
 
 
 def stool_ground(points: npt.ArrayLike) -> FloatArray:
-    """Height [m] of what one stands on: (..., 2) -> (...). The stool's top, or the floor."""
+    """Height of the ground at points (..., 2): (...) [m], the top of the stool or the floor."""
     at = np.asarray(points, dtype=np.float64)
     return np.where(box_distance(at, stool_world().boxes[0]) <= 0.0, SIDE_M, 0.0)
 
 
 def stool_contacts(motion: Motion, character: Character) -> BoolArray:
-    """Which feet stand on the floor or on the stool, by how near and how slow they are.
+    """Which feet stand on the floor or on the stool: those that are near it and slow.
 
     Args:
-        motion: In the world of the stool.
-        character: Whose motion it is.
+        motion: A motion in the world of the stool.
+        character: The character.
 
     Returns:
         (frames, 2): left, right.
@@ -57,10 +57,10 @@ def stool_contacts(motion: Motion, character: Character) -> BoolArray:
 
 
 def stool_motions(character: Character) -> list[Motion]:
-    """The built-in motion about the stool, from its four sides.
+    """The built-in motion on the stool, from its four sides.
 
     Args:
-        character: Whose motions they are.
+        character: The character.
 
     Returns:
         Four motions in one world, named "built-in: ...", with the contacts of their feet.
@@ -72,13 +72,13 @@ def stool_motions(character: Character) -> list[Motion]:
 
 
 def from_all_sides(motion: Motion) -> list[Motion]:
-    """A motion about the stool, and the same turned about it by quarter turns.
+    """A motion on the stool, and the same after one, two and three quarter turns.
 
-    The stool looks alike from its four sides, so all that is done from one side can be done from
-    the others: what begins where another copy ends can follow it.
+    The stool has four equal sides, so a motion from one side also fits the others. A copy can
+    follow another that ends where it begins.
 
     Args:
-        motion: In the world of the stool.
+        motion: A motion in the world of the stool.
 
     Returns:
         Four motions, the given one first.

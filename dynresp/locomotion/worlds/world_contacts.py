@@ -1,6 +1,6 @@
-"""Contacts with an environment that is no flat floor: soles on uneven ground, hands on bars.
+"""Contacts with worlds other than a flat floor: soles on uneven ground, hands on bars.
 
-A body part touches a thing if it is near it and hardly moves (Lee et al. 2002, section 3).
+A body part touches a thing if it is near and hardly moves (Lee et al. 2002, section 3).
 """
 
 from __future__ import annotations
@@ -21,27 +21,19 @@ from dynresp.support.arrays import BoolArray
 from dynresp.support.runs import runs
 
 Ground: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Height [m] of the ground at points (..., 2): (...); not a number where there is none."""
+"""Height [m] of the ground at points (..., 2): (...); NaN where there is no ground."""
 
-# Part of the way from a sole's middle to its corners at which the ground beneath it is looked up. A
-# toe may stick out over an edge, or seem to reach into the next block by what the grid is wrong.
+# The ground under a sole is looked up at this part of the way from its middle to its corners: a toe
+# may stick out over an edge, and an error of the grid may put it into the next block.
 _INNER = 0.5
 PALM = np.array([0.0, 0.0, -0.35])
-"""The middle of a hand, which closes about things, in the forearm's frame [m]."""
+"""The middle of a gripping hand, in the forearm's frame [m]."""
 PALM.flags.writeable = False
 
 
-@dataclass(frozen=True)
-class StanceConfig:
-    """When a foot stands, whatever it stands on.
-
-    Attributes:
-        speed: All corners of its sole are at most this fast [m/s].
-        shortest_s: For at least this long [s].
-    """
-
-    speed: float = 0.35
-    shortest_s: float = 0.1
+# A foot stands, whatever it stands on, while no corner of its sole is faster than this [m/s],
+# for at least this long [s].
+_STANCE_SPEED, _MIN_STANCE_S = 0.35, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +44,7 @@ class Stances:
         feet: (k,) 0 for the left foot, 1 for the right one.
         starts: (k,) first frames.
         stops: (k,) one past the last frames.
-        soles: (k, 4, 3) where the corners of the soles are, medians over the frames [m].
+        soles: (k, 4, 3) corners of the soles, medians over the frames [m].
     """
 
     feet: npt.NDArray[np.intp]
@@ -108,24 +100,22 @@ def speeds(points: FloatArray, fps: float) -> FloatArray:
     return np.asarray(np.linalg.norm(np.gradient(points, 1.0 / fps, axis=0), axis=-1))
 
 
-def find_stances(corners: FloatArray, fps: float, config: StanceConfig | None = None) -> Stances:
-    """When and where feet stand.
+def find_stances(corners: FloatArray, fps: float) -> Stances:
+    """Find when and where feet stand.
 
     Args:
         corners: (frames, 2, 4, 3) corners of the soles [m]; see `sole_corners`.
         fps: Frame rate [1/s].
-        config: What standing is.
 
     Returns:
-        The stances, those of the left foot first, each foot's in the order of time.
+        The stances: first those of the left foot; of each foot in the order of time.
     """
-    config = config or StanceConfig()
-    slow = np.all(speeds(corners, fps) <= config.speed, axis=2)
+    slow = np.all(speeds(corners, fps) <= _STANCE_SPEED, axis=2)
     found = [
         (foot, start, stop)
         for foot in range(2)
         for start, stop in runs(slow[:, foot])
-        if stop - start >= config.shortest_s * fps
+        if stop - start >= _MIN_STANCE_S * fps
     ]
     feet, starts, stops = np.array(found, dtype=np.intp).reshape(-1, 3).T
     soles = [np.median(corners[start:stop, foot], axis=0) for foot, start, stop in found]
@@ -167,10 +157,10 @@ def feet_on(ground: Ground, corners: FloatArray, fps: float) -> BoolArray:
 def steady(flags: BoolArray, fps: float, gap_s: float) -> BoolArray:
     """Flags (frames, columns) with gaps closed, then runs dropped, that are shorter than a time.
 
-    Runs and gaps at the ends are cut off by the recording, and stay.
+    Runs and gaps at the ends stay: they may be longer than the recording shows.
 
     Args:
-        flags: What is to be made steady.
+        flags: What to make steady.
         fps: Frame rate [1/s].
         gap_s: The time [s].
     """
@@ -178,7 +168,7 @@ def steady(flags: BoolArray, fps: float, gap_s: float) -> BoolArray:
 
     length = max(1, round(gap_s * fps))
     window = np.ones((length, 1), dtype=bool)
-    # Ends are drawn out so that what is cut off there counts as long.
+    # The ends are extended, so that runs that are cut off there count as long.
     padded = np.pad(flags, ((2 * length, 2 * length), (0, 0)), mode="edge")
     closed = ndimage.binary_closing(padded, window)
     opened: BoolArray = ndimage.binary_opening(closed, window)[2 * length : -2 * length]

@@ -11,7 +11,8 @@ from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import Composition, compose
 from dynresp.locomotion.worlds.playground import Bar, Playground, playground_contacts
 from dynresp.locomotion.worlds.playground_fitting import (
-    HandFitConfig,
+    GRIP_M,
+    REGRIP_S,
     compose_on_playground,
     find_holds,
     grips,
@@ -85,7 +86,7 @@ def test_a_hand_that_holds_stays_where_it_holds(
     tight = grips(character, fitted.motion, holds, bars)
     assert loose.slip.max() > 0.04
     assert tight.slip.max() < 0.002
-    reach = HandFitConfig().hand_m + bars.bars[0].radius
+    reach = GRIP_M + bars.bars[0].radius
     assert tight.off_bar.max() < reach + 1e-3
     # The held point of the hand is at the held point of the bar, at once and to the end.
     states = character.kinematics(fitted.motion.poses)
@@ -132,14 +133,12 @@ def test_a_hand_goes_from_bar_to_bar(
     played = over(graph, character, path)
     holds = [h for h in find_holds(graph, character, played, two) if h.hand == 0]
     assert [hold.bar for hold in holds] == [0, 1]
-    assert holds[1].start - holds[0].stop == round(HandFitConfig().regrip_s * FPS)
+    assert holds[1].start - holds[0].stop == round(REGRIP_S * FPS)
     fitted = compose_on_playground(graph, character, path, FPS, two)
     assert grips(character, fitted.motion, holds, two).slip.max() < 0.002
 
 
 def test_what_cannot_be_fitted_is_refused(graph: MotionGraph, character: Character) -> None:
-    with pytest.raises(UsageError, match="ease_s must be above 0"):
-        HandFitConfig(ease_s=0.0)
     feet_alone = MotionGraph.build(
         [Motion(hanging(character, 0, 0.0), FPS, "hanging")], FIXED, character
     )
