@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from dynresp.locomotion.worlds.obstacles import MOST_BOXES, Obstacle, World
+from dynresp.locomotion.worlds.obstacles import MAX_BOXES, Obstacle, World
 from dynresp.specs.shared_tables import Strict
 from dynresp.specs.toml_errors import Hints, read_spec
 from dynresp.specs.values import fixed, shown
@@ -48,7 +48,7 @@ class WorldFile(Strict):
     """A whole file."""
 
     world: WorldTable
-    box: Annotated[list[BoxTable], Field(default_factory=list, max_length=MOST_BOXES)]
+    box: Annotated[list[BoxTable], Field(default_factory=list, max_length=MAX_BOXES)]
 
 
 _HINTS = Hints(missing={"world": "add [world] with bounds"})

@@ -10,7 +10,7 @@ from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.path_walk import SPACING, Follower, SketchConfig, SketchedWalk
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.path_planning import fit_path, plan_path
-from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled
+from dynresp.locomotion.worlds.paths import as_path, as_point, check_length, resampled
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
 from dynresp.support.progress import Progress
@@ -85,7 +85,7 @@ def reach(
     _check_kinds(graph, start, world, config)
     follower = Follower(graph, start, world, config, progress)
     config, root = follower.config, follower.begin
-    end = as_place(goal, "a goal")
+    end = as_point(goal, "a goal")
     check_length(np.stack([root, end]), "the straight way to the goal")
 
     def path_from(closed: FloatArray) -> FloatArray:

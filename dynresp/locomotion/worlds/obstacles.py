@@ -1,4 +1,4 @@
-"""Boxes on the ground, and how far points and bodies are from them."""
+"""Boxes on the ground, and distances of points and bodies to them."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from dynresp.motion.character import POSE_SIZE, Character, as_poses
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
 
-# Half the thickness [m] of the walls that stand around a world: nobody gets to their far side.
+# Half the thickness of the walls around a world [m], too thick to pass through.
 _RIM = 500.0
-# Bodies farther than this from a root in rest [m] belong to no character of human size.
+# No body of a character of human size is farther than this from its root [m].
 _REACH = 1.5
-# Grids over a world must fit into memory and time: a plan in cells of 0.1 m over the largest world
-# takes about 1.5 GB and half a minute.
-_MOST_SIDE_M = 400.0
-_MOST_AREA_M2 = 40_000.0
-_MOST_CELLS = 5_000_000
-MOST_BOXES = 10_000
-"""Boxes of a world at most."""
-# What lies within this of each box [m], added up, is at most this much ground [m^2].
-_NEAR_M, _MOST_NEAR_M2 = 2.0, 1e6
+# Limits of memory and time: planning in cells of 0.1 m over the largest world takes about 1.5 GB
+# and half a minute.
+_MAX_SIDE_M = 400.0
+_MAX_AREA_M2 = 40_000.0
+_MAX_CELLS = 5_000_000
+MAX_BOXES = 10_000
+"""Most boxes of a world."""
+# The ground within this distance of each box [m], added up, is at most this large [m^2].
+_NEAR_M, _MAX_NEAR_M2 = 2.0, 1e6
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,10 @@ class Obstacle:
     """A box that stands on the ground.
 
     Attributes:
-        center: Of its base, x and y [m].
-        half_sizes: Half its length along its own x and y [m].
-        yaw: By how much it is turned about the vertical [rad].
-        height: How high it is [m].
+        center: Middle of its base, x and y [m].
+        half_sizes: Half its size along its own x and y [m].
+        yaw: Angle about the vertical [rad].
+        height: Its height [m].
 
     Raises:
         UsageError: A number is not finite, or a size is not above 0.
@@ -52,7 +52,8 @@ class Obstacle:
         """Check the numbers."""
         if not (_are_finite(self.center, 2) and _are_finite((self.yaw,), 1)):
             raise UsageError(
-                f"an obstacle must be at a finite place, got {self.center!r}, {self.yaw!r}"
+                f"the place of an obstacle must be finite numbers, got "
+                f"{self.center!r}, {self.yaw!r}"
             )
         sizes_are_right = _are_finite(self.half_sizes, 2) and _are_finite((self.height,), 1)
         if not (sizes_are_right and min(*self.half_sizes, self.height) > 0):
@@ -67,7 +68,7 @@ class World:
     """Level ground with a rim, and boxes on it. Leaving the rim counts as a collision.
 
     Attributes:
-        bounds: Least x, least y, largest x, largest y [m].
+        bounds: Smallest x, smallest y, largest x, largest y [m].
         obstacles: The boxes; they may overlap.
 
     Raises:
@@ -83,47 +84,48 @@ class World:
         """Check the bounds."""
         if not _are_finite(self.bounds, 4):
             raise UsageError(
-                f"bounds must be (least x, least y, largest x, largest y), got {self.bounds!r}"
+                f"bounds must be (smallest x, smallest y, largest x, largest y), got "
+                f"{self.bounds!r}"
             )
         low_x, low_y, high_x, high_y = self.bounds
         if not (low_x < high_x and low_y < high_y):
             raise UsageError(
-                f"bounds must be (least x, least y, largest x, largest y), got {self.bounds}"
+                f"bounds must be (smallest x, smallest y, largest x, largest y), got {self.bounds}"
             )
         wide, deep = high_x - low_x, high_y - low_y
-        if max(wide, deep) > _MOST_SIDE_M:
+        if max(wide, deep) > _MAX_SIDE_M:
             raise UsageError(
-                f"bounds must have sides of at most {_MOST_SIDE_M:g} m, got {wide:g} x {deep:g} m; "
+                f"bounds must have sides of at most {_MAX_SIDE_M:g} m, got {wide:g} x {deep:g} m; "
                 "cut the world to where the avatar walks"
             )
         area = wide * deep
-        if area > _MOST_AREA_M2:
+        if area > _MAX_AREA_M2:
             raise UsageError(
-                f"bounds must enclose at most {_MOST_AREA_M2:.0f} m2, got {area:.0f} m2; "
+                f"bounds must enclose at most {_MAX_AREA_M2:.0f} m2, got {area:.0f} m2; "
                 "cut the world to where the avatar walks"
             )
         if not isinstance(self.obstacles, tuple):
             kind = type(self.obstacles).__name__
             raise UsageError(f"obstacles must be a tuple of Obstacle, got {kind}")
-        if len(self.obstacles) > MOST_BOXES:
+        if len(self.obstacles) > MAX_BOXES:
             raise UsageError(
-                f"a world may have at most {MOST_BOXES} boxes, got {len(self.obstacles)}; "
+                f"a world may have at most {MAX_BOXES} boxes, got {len(self.obstacles)}; "
                 "leave out boxes that the avatar does not come near"
             )
         for box in self.obstacles:
             if not isinstance(box, Obstacle):
                 raise UsageError(f"obstacles must be Obstacle, got {type(box).__name__}")
         ground = self._near_ground()
-        if ground > _MOST_NEAR_M2:
+        if ground > _MAX_NEAR_M2:
             raise UsageError(
                 f"the {len(self.obstacles)} boxes are too large and too many: the ground within "
-                f"{_NEAR_M:g} m of each adds up to {ground:.0f} m2, at most {_MOST_NEAR_M2:.0f} "
+                f"{_NEAR_M:g} m of each adds up to {ground:.0f} m2, at most {_MAX_NEAR_M2:.0f} "
                 "are allowed; leave out boxes that others cover or that the avatar does not come "
                 "near"
             )
 
     def _near_ground(self) -> float:
-        """How much ground within the bounds lies near boxes, added up [m^2]."""
+        """The ground within the bounds near each box, added up [m^2]."""
         if not self.obstacles:
             return 0.0
         boxes = self.boxes[: len(self.obstacles)]
@@ -158,24 +160,25 @@ class World:
         return boxes
 
     def grid_shape(self, side_m: float) -> tuple[int, int]:
-        """How many square cells a grid over the bounds has along x and y.
+        """Number of square cells along x and y of a grid over the bounds.
 
         Args:
             side_m: Side of the cells [m].
 
         Raises:
-            UsageError: There are too many.
+            UsageError: There are too many cells.
         """
         if not 0 < side_m < math.inf:
             raise UsageError(f"the side of cells must be above 0 and finite, got {side_m:g}")
         low_x, low_y, high_x, high_y = self.bounds
         size = (high_x - low_x, high_y - low_y)
-        # Floats, which may be infinite here, as whole numbers may not.
+        # Floats, since they may be infinite here.
         cells = [max(1.0, float(np.ceil(length / side_m))) for length in size]
-        if not math.prod(cells) <= _MOST_CELLS:
+        if not math.prod(cells) <= _MAX_CELLS:
             raise UsageError(
-                f"a world of {size[0]:g} x {size[1]:g} m in cells of {side_m:g} m is too much to "
-                f"lay out: at most {_MOST_CELLS} cells; choose larger cells or a smaller world"
+                f"a world of {size[0]:g} x {size[1]:g} m in cells of {side_m:g} m has too "
+                f"many cells: at most {_MAX_CELLS} are allowed; choose larger cells or a "
+                "smaller world"
             )
         return int(cells[0]), int(cells[1])
 
@@ -196,7 +199,7 @@ class World:
 
 
 def _are_finite(values: object, count: int) -> bool:
-    """Whether these are so many finite numbers."""
+    """Whether these are `count` finite numbers."""
     try:
         numbers = [float(value) for value in values]  # type: ignore[attr-defined]
     except (TypeError, ValueError, OverflowError):
@@ -214,20 +217,20 @@ def box_distance(points: FloatArray, box: FloatArray) -> FloatArray:
 
 
 def body_clearances(
-    world: World, character: Character, poses: npt.ArrayLike, farthest: float = 0.5
+    world: World, character: Character, poses: npt.ArrayLike, max_distance: float = 0.5
 ) -> FloatArray:
-    """How near the body comes to the boxes, by MuJoCo's distances between geoms.
+    """Distance of the body to the boxes, by MuJoCo's distances between geoms.
 
     Exact, and slow: about a tenth of a millisecond a frame. The rim is left out.
 
     Args:
         world: The boxes.
-        character: Whose poses they are.
+        character: The character.
         poses: (frames, 59).
-        farthest: Distances beyond this are not told apart [m].
+        max_distance: Larger distances count as this [m].
 
     Returns:
-        (frames,) least distance of any geom of the body to any box [m], at most `farthest`;
+        (frames,) smallest distance of any geom of the body to any box [m], at most `max_distance`;
         negative where they overlap.
     """
     poses = as_poses(poses)
@@ -245,12 +248,12 @@ def body_clearances(
     data = mujoco.MjData(model)
     bodies = np.flatnonzero(model.geom_bodyid > 0)
     walls = [model.geom(f"obstacle {index}").id for index in range(len(world.obstacles))]
-    out = np.full(len(poses), farthest)
+    out = np.full(len(poses), max_distance)
     for frame, pose in enumerate(poses):
         data.qpos[:POSE_SIZE] = pose
         mujoco.mj_kinematics(model, data)
         for wall, box in zip(walls, world.boxes, strict=False):
-            if box_distance(pose[:2], box) > _REACH + farthest:
+            if box_distance(pose[:2], box) > _REACH + max_distance:
                 continue
             for geom in bodies:
                 found = mujoco.mj_geomDistance(model, data, int(geom), wall, out[frame], None)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
-from dynresp.locomotion.worlds.paths import as_place, resampled
+from dynresp.locomotion.worlds.paths import as_point, resampled
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IndexArray
 from dynresp.support.checks import check_numbers
@@ -162,7 +162,7 @@ def plan_path(
     from scipy.sparse.csgraph import dijkstra
 
     config = config or PlanningConfig()
-    ends = np.stack([as_place(start, "a start"), as_place(goal, "a goal")])
+    ends = np.stack([as_point(start, "a start"), as_point(goal, "a goal")])
     grid = _Grid(world, config, np.asarray(blocked, dtype=np.float64).reshape(-1, 3))
     first, last = grid.nearest_free(ends[0], "start"), grid.nearest_free(ends[1], "goal")
     a, b, costs = grid.ways()

@@ -1,8 +1,8 @@
-"""Recorded terrain: which blocks people walked on, told from where their feet stood.
+"""Recorded terrain: find the blocks that people walked on from where their feet stood.
 
-Made for three clips of the CMU database (subject 3), which are 45 s of walking over square blocks
-of several heights. What the files do not hold is found from the motion: how the grid of blocks
-lies, and how high each block is. `onto_blocks` then moves the motion onto an exact grid.
+Made for three clips of the CMU database (subject 3): 45 s of walking over square blocks of several
+heights. The files do not describe the blocks. So the grid and the height of each block are found
+from the motion, and `onto_blocks` moves the motion onto an exact grid.
 """
 
 from __future__ import annotations
@@ -29,34 +29,34 @@ from dynresp.support.arrays import LongArray
 from dynresp.support.errors import MotionError
 
 RECORDED_SCALE = 1.0382
-"""Size of the recorded blocks on the character: its legs are so much longer than the subject's,
-and retargeting scales where people are by that."""
+"""Scale of the recorded blocks after retargeting: the character's legs are longer than the
+subject's by this factor, and retargeting scales positions by it."""
 
-# A sole that is tilted by more than this from heel to ball [m] tells no height.
+# A sole whose heel and ball differ in height by more than this [m] is not used.
 _TILT = 0.05
 # Grids are tried at this many offsets along each side of a block, and at these turns [rad].
 _OFFSETS = 40
 _YAWS = np.radians(np.arange(-45.0, 45.0, 1.0))
-# Grids are as good as the best one if the variance of their heights [m2] is up to this part more,
-# or more by what no measurement tells.
-_AS_GOOD, _UNTOLD = 1.05, 0.003**2
-# Stances must tell more heights than one each for this many blocks, or the grid is a guess.
+# A grid is as good as the best one if its variance of heights [m2] is at most the best one's times
+# the first number plus the second, which is below what can be measured.
+_AS_GOOD, _NOISE_M2 = 1.05, 0.003**2
+# There must be this many more stances than blocks, or the grid is a guess.
 _SPARE = 8
-# A leg is straight from this part of its length on; nearer to it a knee turns by 10 degrees for a
+# A leg counts as straight from this part of its length on: beyond, a knee turns by 10 degrees for a
 # few millimetres.
 _STRAIGHT = 0.995
-# Time over which the root follows the feet up or down [s].
+# Time in which the root follows the feet up or down [s].
 _FOLLOW_S = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class BlockFit:
-    """A grid of blocks as the stances of some motions tell it.
+    """The grid of blocks under some motions.
 
     Attributes:
-        yaw: How its x axis is turned from that of the motions [rad], within an eighth of a turn.
+        yaw: Angle from the motions' x axis to the grid's [rad], within an eighth of a turn.
         corner: (2,) where block (0, 0) begins, in coordinates turned by -yaw [m].
-        side: Side of a block, as the motions have it [m].
+        side: Side of a block at the scale of the motions [m].
         levels: (columns, rows) level of each block, the lowest 0; 0 where no foot stood.
         stances: (columns, rows) how many level stances there were on each block.
         base: (motions,) height of level 0 in each motion's own coordinates [m].
@@ -80,24 +80,24 @@ def fit_blocks(
 ) -> BlockFit:
     """Find the grid, and the level of every block that a foot stood on.
 
-    The grid is one for all motions, found in the longest of them: the one whose blocks agree best
-    about the heights of the stances on them, and of those that are equally good the one on whose
-    blocks the feet stand nearest to the middle.
+    All motions have one grid, which is found in the longest of them. It is the grid with the
+    smallest variance of the heights of stances on the same block; of equally good ones the grid on
+    whose blocks feet stand nearest to the middle.
 
     Args:
         character: The character.
-        motions: Recorded on the same blocks in one world; their heights may differ by a constant.
-        scale: Size of the blocks in the motions over that of real ones.
+        motions: Motions on the same blocks in one world; their heights may differ by a constant.
+        scale: Size of the blocks in the motions divided by their real size.
 
     Raises:
-        MotionError: There are too few stances to tell a grid.
+        MotionError: There are too few stances to find a grid.
     """
     side, level = BLOCK_M * scale, LEVEL_M * scale
     soles = [_level_soles(character, motion) for motion in motions]
     longest = int(np.argmax([len(s) for s in soles]))
     if len(soles[longest]) <= _SPARE:
         raise MotionError(
-            f"{len(soles[longest])} stances are too few to tell how blocks of {side:.3f} m lie; "
+            f"{len(soles[longest])} stances are too few to find a grid of {side:.3f} m blocks; "
             "give a longer motion over them"
         )
     yaw, corner, scatter = _find_grid(soles[longest], side)
@@ -133,21 +133,21 @@ def onto_blocks(
 ) -> tuple[list[Motion], Terrain]:
     """Move recorded motions onto an exact grid of blocks that begins at the origin.
 
-    They are turned and shifted so that the grid lies along the axes, brought to the blocks' real
-    size, and their legs are bent or stretched so that standing feet touch the blocks. What is
-    between two stances of a foot is shifted by what is between their shifts, and the root by the
-    mean of both feet's, smoothed.
+    The motions are turned and shifted so that the grid is along the axes, and scaled to the blocks'
+    real size. Legs are bent or stretched so that standing feet touch the blocks. Between two
+    stances of a foot its shift is interpolated. The root moves by the mean shift of both feet,
+    smoothed.
 
     Args:
         character: The character.
-        motions: Recorded on the same blocks.
-        fit: Where the blocks were, by default as `fit_blocks` finds them.
+        motions: Motions on the same blocks.
+        fit: The blocks, by default those that `fit_blocks` finds.
 
     Returns:
         The motions, with the feet's contacts with the blocks, and the blocks.
 
     Raises:
-        MotionError: There are too few stances to tell a grid.
+        MotionError: There are too few stances to find a grid.
     """
     fit = fit_blocks(character, motions) if fit is None else fit
     terrain = Terrain(fit.levels)
@@ -194,17 +194,17 @@ def _find_grid(soles: FloatArray, side: float) -> tuple[float, FloatArray, float
     best = variances.min()
     if not np.isfinite(best):
         raise MotionError(
-            f"{len(soles)} stances are nearly each on a block of its own, which tells no grid; "
+            f"nearly all {len(soles)} stances are on different blocks, so no grid is found; "
             "give a longer motion over the same blocks"
         )
-    good = np.argwhere(variances <= best * _AS_GOOD + _UNTOLD)
+    good = np.argwhere(variances <= best * _AS_GOOD + _NOISE_M2)
     off = [_off_middle(soles, _YAWS[y], corners[c], side) for y, c in good]
     y, c = good[np.argmin(off)]
     return float(_YAWS[y]), corners[c], float(np.sqrt(variances[y, c]))
 
 
 def _variances(soles: FloatArray, yaw: float, corners: FloatArray, side: float) -> FloatArray:
-    """(grids,) variance of the heights on the same block; infinite where blocks are too many."""
+    """(grids,) variance of heights on the same block; infinite if there are too many blocks."""
     heights = np.median(soles[..., 2], axis=1)
     at = _turned(soles.mean(axis=1), yaw)
     cells = np.floor((at - corners[:, None]) / side).astype(np.int64)
@@ -271,7 +271,7 @@ def _settle(
     middles = stances.soles.mean(axis=1)
     shift = np.zeros((len(poses), 2))
     for foot in range(2):
-        # First the stances as a whole, since their heights are off by up to half a level.
+        # First each stance as a whole: its height may be off by up to half a level.
         mine = stances.feet == foot
         wanted = terrain.height(middles[mine]) - np.median(stances.soles[mine, :, 2], axis=1)
         known = np.abs(wanted) < level
@@ -282,7 +282,7 @@ def _settle(
     contacts = feet_on(terrain.height, corners, fps)
     above = heights_above(terrain.height, corners).min(axis=2)
     for foot in range(2):
-        # Then frame by frame, so that what touches first and last does touch.
+        # Then frame by frame, so that feet touch from the first to the last frame of contact.
         at = np.flatnonzero(contacts[:, foot])
         if len(at):
             shift[:, foot] -= np.interp(frames, at, above[at, foot])

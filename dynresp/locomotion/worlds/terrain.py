@@ -1,7 +1,7 @@
 """Rough terrain: square blocks of several heights on a grid (Lee et al. 2002, section 6).
 
-Heights are whole numbers of levels. The recorded terrain (`blocks.onto_blocks`) has blocks of 24
-inches and levels of 2.5 inches, a third of the block of 7.5 inches that the paper names.
+Heights are whole numbers of levels. The recorded terrain (`recorded_terrain.onto_blocks`) has
+blocks of 24 inches and levels of 2.5 inches, a third of the paper's height of 7.5 inches.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BLOCK_M = 0.6096
 LEVEL_M = 0.0635
 """Height of a level [m]: 2.5 inches."""
 
-# Thickness of what is drawn below level 0 [m].
+# Thickness of the ground that is drawn below level 0 [m].
 _GROUND = 0.05
 
 
@@ -37,7 +37,7 @@ class Terrain:
         level_m: Height of a level [m].
 
     Raises:
-        UsageError: There is no block, or a number makes no sense.
+        UsageError: There is no block, or a number is not finite or a size not above 0.
     """
 
     levels: npt.NDArray[np.int64]
@@ -70,31 +70,31 @@ class Terrain:
         highest: int = 6,
         steepest: int = 3,
     ) -> Terrain:
-        """A terrain drawn at random.
+        """A random terrain.
 
-        Block by block, each gets any height that its neighbours allow.
+        One block after the other gets a random height that its neighbours allow.
 
         Args:
-            rng: Where the numbers come from.
+            rng: Source of random numbers.
             columns: Blocks along x.
             rows: Blocks along y.
             highest: Highest level; the lowest is 0. Six are the paper's two blocks.
-            steepest: How many levels neighbours differ at most, diagonal ones as well. Three are
-                one of the paper's blocks.
+            steepest: Largest difference in levels between neighbours, also diagonal ones. Three
+                are one of the paper's blocks.
 
         Raises:
-            UsageError: A number makes no sense.
+            UsageError: There would be no block, or a level below 0.
         """
         if min(columns, rows) < 1 or highest < 0 or steepest < 0:
             raise UsageError(
-                "a terrain needs a column and a row, and levels from 0; got "
+                "a terrain needs at least one column and one row, and levels of 0 or more; got "
                 f"{columns} x {rows}, highest {highest}, steepest {steepest}"
             )
         levels = np.zeros((columns, rows), dtype=np.int64)
         for i in range(columns):
             for j in range(rows):
-                # Those that have their height, which differ by two steps at most: some height is
-                # always left.
+                # Neighbours that have a height differ by two steps at most, so there is always a
+                # height that fits.
                 before = levels[max(i - 1, 0) : i, max(j - 1, 0) : j + 2].ravel()
                 around = np.concatenate([before, levels[i, max(j - 1, 0) : j]])
                 low, high = 0, highest
@@ -106,7 +106,7 @@ class Terrain:
 
     @property
     def size(self) -> tuple[float, float]:
-        """How far the grid reaches along x and along y [m]."""
+        """Size of the grid along x and along y [m]."""
         columns, rows = self.levels.shape
         return columns * self.block_m, rows * self.block_m
 
@@ -116,12 +116,12 @@ class Terrain:
         Beside the grid they are below 0 or beyond it, where there is no block.
         """
         at = np.asarray(points, dtype=np.float64)[..., :2]
-        # Not a number becomes a place beside the grid.
+        # NaN becomes a cell beside the grid.
         steps = np.nan_to_num(np.floor((at - np.array(self.corner)) / self.block_m), nan=-1.0)
         return np.clip(steps, -1, np.array(self.levels.shape)).astype(np.int64)
 
     def height(self, points: npt.ArrayLike) -> FloatArray:
-        """Height [m] of the surface under points (..., 2 or more) [m]; not a number beside it."""
+        """Height [m] of the surface under points (..., 2 or more) [m]; NaN beside the grid."""
         ij = self.cells(points)
         inside = np.all((ij >= 0) & (ij < np.array(self.levels.shape)), axis=-1)
         i, j = np.moveaxis(np.where(inside[..., None], ij, 0), -1, 0)
@@ -130,18 +130,17 @@ class Terrain:
     def supports(
         self, soles: npt.ArrayLike, placements: npt.ArrayLike, tolerance: float = 0.03
     ) -> npt.NDArray[np.bool_]:
-        """Whether feet that are put somewhere stand on the terrain.
+        """Whether feet of placed clips stand on the terrain.
 
-        A foot stands if the least height of its points above the blocks beneath them is zero,
-        but for the tolerance: it then touches a block and sinks into none. It may stick out
-        over an edge; see `contacts.heights_above`.
+        A foot stands if its lowest point is at the height of the block below it, within the
+        tolerance. It may stick out over an edge; see `world_contacts.heights_above`.
 
         Args:
-            soles: (..., points, 3) of each foot, in the clip's own world [m]. A foot whose points
-                are not numbers does not stand, and needs no ground.
-            placements: (..., 4) where the clips are put: x, y, z [m] and yaw [rad]; broadcast
+            soles: (..., points, 3) of each foot, in the clip's own world [m]. A foot of NaN is in
+                the air and needs no ground.
+            placements: (..., 4) placements of the clips: x, y, z [m] and yaw [rad]; broadcast
                 against the feet.
-            tolerance: How far a foot may hover or sink [m].
+            tolerance: Largest distance above or below the block [m].
 
         Returns:
             (...) for each foot.
@@ -152,14 +151,14 @@ class Terrain:
         return np.asarray(standing | np.any(np.isnan(points), axis=(-2, -1)))
 
     def standing(self, soles: npt.ArrayLike, at: npt.ArrayLike) -> FloatArray:
-        """A placement brought to the height at which a frame's feet stand, for a beginning.
+        """The placement at the height at which the feet of a frame stand.
 
         Args:
-            soles: (feet, points, 3) of one frame, as in `supports`; one foot at least stands.
-            at: (4,) x, y and yaw of the placement; its z does not matter.
+            soles: (feet, points, 3) of one frame, as in `supports`; at least one foot stands.
+            at: (4,) x, y and yaw of the placement; its z has no effect.
 
         Returns:
-            (4,) with z a whole number of levels, the least at which no standing foot sinks into a
+            (4,) with z a whole number of levels, the lowest at which no standing foot sinks into a
             block by more than half a level.
 
         Raises:
@@ -182,8 +181,8 @@ class Terrain:
         """The blocks as boxes along the axes, for drawing.
 
         Returns:
-            Centres (n, 3) and half sizes (n, 3) [m]. All reach down to a little below level 0 or
-            the lowest level, whichever is lower.
+            Centres (n, 3) and half sizes (n, 3) [m]. All reach down to a little below the lower of
+            level 0 and the lowest level.
         """
         columns, rows = self.levels.shape
         i, j = np.mgrid[0:columns, 0:rows].reshape(2, -1)
@@ -195,7 +194,7 @@ class Terrain:
         return centers, np.stack([half, half, 0.5 * (top - bottom)], axis=1)
 
     def _above(self, soles: FloatArray, placements: FloatArray) -> FloatArray:
-        """Heights (..., points) [m] of soles that are put somewhere above the blocks."""
+        """Heights (..., points) [m] of placed soles above the blocks."""
         states = np.concatenate([soles, np.zeros((*soles.shape[:-1], 1))], axis=-1)
         there = placement.compose(placements[..., None, :], states)
         return heights_above(self.height, there[..., :3])

@@ -1,10 +1,10 @@
-"""From a walk over blocks to a motion whose feet stand on them, and a check of that.
+"""Fitting the feet of a walk to the blocks of a terrain, and measuring how they stand.
 
-What is played is blended, so a foot may come down beside its block, and the walk allows stances
-that are higher or lower than recorded. First the feet are fitted as on level ground, which stops
-them from sliding. Then each stance is put on its block: to its height, and away from edges at which
-the height changes. In a swing the shift passes from one stance's to the next, and the foot is
-raised over the blocks on its way. The root follows the feet.
+The motion is blended, so a foot may come down beside its block, and the walk allows stances that
+are higher or lower than recorded. First the feet are fitted as on level ground, so that they do not
+slide. Then each stance moves to its block: to its height, and away from edges at which the height
+changes. In a swing the shift goes from that of one stance to that of the next, and the foot is
+raised over the blocks below it. The root follows the feet.
 """
 
 from __future__ import annotations
@@ -27,58 +27,33 @@ from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support import smoothing
 from dynresp.support.arrays import LongArray
-from dynresp.support.errors import UsageError
 from dynresp.support.runs import runs
 
-# How far the root is lowered at most [m]: farther than on level ground, since so little was
-# recorded that jumps are rough.
+# The root is lowered by at most this [m]: more than on level ground, since jumps are rough in a
+# graph of so little motion.
 _MAX_ROOT_DROP = 0.12
-
-
-@dataclass(frozen=True)
-class TerrainFitConfig:
-    """How feet are put on blocks.
-
-    Attributes:
-        edge_m: Distance that soles keep from edges at which the height changes [m].
-        clear_m: Height by which a swinging sole passes over blocks [m].
-        lift_s: Time in which it gets as high as that [s].
-        climb: How fast a foot is raised for that at most [m/s].
-        follow_s: Time over which the root follows the feet [s].
-        straight: Part of its length to which a leg is stretched at most.
-
-    Raises:
-        UsageError: A number makes no sense.
-    """
-
-    edge_m: float = 0.01
-    clear_m: float = 0.02
-    lift_s: float = 0.12
-    climb: float = 1.0
-    follow_s: float = 0.5
-    straight: float = 0.99
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for name in ("edge_m", "clear_m"):
-            if not getattr(self, name) >= 0:
-                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
-        for name in ("lift_s", "climb", "follow_s", "straight"):
-            if not getattr(self, name) > 0:
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+# Distance that soles keep from edges at which the height changes [m].
+_EDGE_M = 0.01
+# Height at which a swinging sole passes over blocks [m], and the time to reach it [s].
+_CLEAR_M, _LIFT_S = 0.02, 0.12
+# Largest speed at which a foot is raised for that [m/s].
+_MAX_CLIMB_SPEED = 1.0
+# Time in which the root follows the feet [s].
+_FOLLOW_S = 0.5
+# Part of its length to which a leg is stretched.
+_STRAIGHT = 0.99
 
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """How the feet of a motion stand on blocks, stance by stance. A stance is a run of contact.
+    """How well the feet of a motion stand on blocks. A stance is a run of frames in contact.
 
     Attributes:
-        off_height: (s,) how far the lowest point of the sole is above or below its block, at the
-            worst moment of each stance [m].
-        overhang: (s,) how far the sole sticks out over an edge at which the ground is lower,
-            the median over each stance [m].
-        slide: (s,) the way that the foot slides [m].
-        sunk: (frames,) how deep a sole is in a block, whether it stands or swings [m].
+        off_height: (s,) largest distance of the sole's lowest point above or below its block [m].
+        overhang: (s,) how far the sole sticks out over an edge to lower ground, the median over
+            the stance [m].
+        slide: (s,) distance that the foot slides [m].
+        sunk: (frames,) how deep a sole is in a block, standing or swinging [m].
     """
 
     off_height: FloatArray
@@ -92,58 +67,55 @@ def compose_on_terrain(
     terrain: Terrain,
     walk: TerrainWalk,
     fps: float | None = None,
-    config: TerrainFitConfig | None = None,
 ) -> Composition:
     """Play a walk over blocks, with its feet on them.
 
     Args:
-        graph: Where the walk was found.
+        graph: The graph of the walk.
         terrain: The blocks.
         walk: The walk; two frames or more.
         fps: Frame rate of the motion, by default the graph's.
-        config: How they are put on the blocks.
 
     Returns:
-        As `compose`; `motion` is fitted to the blocks. `unfitted` is at the heights that were
-        recorded, which are not those of the blocks where the walk changes steps.
+        As of `compose`; `motion` is fitted to the blocks. `unfitted` has the recorded heights,
+        which are not those of the blocks where the walk changes steps.
     """
-    config = config or TerrainFitConfig()
     character, rate = graph.character, graph.graph.config.fps
     played = compose(
         graph.graph, character, walk.frames, walk.placements[0], fps, max_root_drop=_MAX_ROOT_DROP
     )
     motion = played.motion
     blocks = walk_blocks(walk, rate, motion)
-    poses = _put_on_blocks(character, terrain, motion, blocks, config)
+    poses = _put_on_blocks(character, terrain, motion, blocks)
     fitted = Motion(poses, motion.fps, "walk over blocks", motion.contacts)
     return Composition(played.frames, fitted, played.jumps, walk.placements, played.unfitted)
 
 
 def walk_blocks(walk: TerrainWalk, rate: float, motion: Motion) -> LongArray:
-    """The block on which each foot of a composed walk is to stand.
+    """The block on which each foot of a composed walk should stand.
 
     Args:
         walk: The walk.
         rate: Its frame rate [1/s].
-        motion: What was composed of it.
+        motion: The motion composed of it.
 
     Returns:
         (n, 2, 2) column and row; -1 where a foot does not stand.
     """
     at = np.arange(len(motion)) * rate / motion.fps
-    # As `compose` takes the contacts: half way between two frames the later one counts.
+    # As in `compose`: half way between two frames the later one counts.
     nearest = np.minimum(np.floor(at + 0.5 + 1e-9).astype(np.intp), len(walk.frames) - 1)
     return np.where(motion.contacts[..., None], walk.blocks[nearest], -1)
 
 
 def footing(character: Character, terrain: Terrain, motion: Motion, blocks: LongArray) -> Footing:
-    """Check how feet stand.
+    """Measure how feet stand.
 
     Args:
         character: The character.
         terrain: The blocks.
         motion: The motion, with its contacts.
-        blocks: (n, 2, 2) the block on which each foot is to stand; see `walk_blocks`.
+        blocks: (n, 2, 2) the block on which each foot should stand; see `walk_blocks`.
     """
     states = character.kinematics(motion.poses)
     soles = sole_corners(character, states)
@@ -174,7 +146,6 @@ def _put_on_blocks(
     terrain: Terrain,
     motion: Motion,
     blocks: LongArray,
-    config: TerrainFitConfig,
 ) -> FloatArray:
     """Poses (n, 59) with every stance on its block."""
     states = character.kinematics(motion.poses)
@@ -186,26 +157,26 @@ def _put_on_blocks(
             rows = slice(start, stop)
             block = blocks[start, foot]
             sole = np.median(soles[rows, foot], axis=0)
-            shift[rows, foot, :2] = drawn_in(terrain, block, sole, config.edge_m)
+            shift[rows, foot, :2] = drawn_in(terrain, block, sole, _EDGE_M)
             top = terrain.levels[tuple(block)] * terrain.level_m
             shift[rows, foot, 2] = top - soles[rows, foot, :, 2].min(axis=1)
         _pass_on(shift[:, foot], stances)
-        _raise(terrain, soles[:, foot], shift[:, foot], stances, motion.fps, config)
-    root = smoothing.average(shift.mean(axis=1), max(1, round(0.5 * config.follow_s * motion.fps)))
-    root[:, 2] -= _lowering(character, states, ankles + shift, root, motion.fps, config)
+        _raise(terrain, soles[:, foot], shift[:, foot], stances, motion.fps)
+    root = smoothing.average(shift.mean(axis=1), max(1, round(0.5 * _FOLLOW_S * motion.fps)))
+    root[:, 2] -= _lowering(character, states, ankles + shift, root, motion.fps)
     poses = np.array(motion.poses)
     poses[:, :3] += root
     return legs.place_ankles(character, poses, ankles + shift)
 
 
 def drawn_in(terrain: Terrain, block: LongArray, sole: FloatArray, edge: float) -> FloatArray:
-    """(2,) the least shift that takes a sole away from edges at which the height changes [m].
+    """(2,) the smallest shift of a sole away from edges at which the height changes [m].
 
     Args:
         terrain: The blocks.
         block: (2,) column and row of the block that it stands on.
         sole: (4, 2 or more) its corners [m].
-        edge: How far it keeps from such edges [m].
+        edge: Distance that it keeps from such edges [m].
     """
     corner = terrain.corner + block * terrain.block_m
     high = np.max(sole[:, :2], axis=0) - corner - terrain.block_m + edge
@@ -250,9 +221,8 @@ def _raise(
     shift: FloatArray,
     stances: list[tuple[int, int]],
     fps: float,
-    config: TerrainFitConfig,
 ) -> None:
-    """Raise a foot (its shift, in place) over the blocks on the way of its swings."""
+    """Raise a swinging foot (its shift, in place) over the blocks below it."""
     from scipy import ndimage
 
     there = soles + shift[:, None]
@@ -260,14 +230,14 @@ def _raise(
     stands = np.zeros(len(need), dtype=bool)
     for start, stop in stances:
         stands[start:stop] = True
-    # Frames to the nearest one in which it stands: it leaves the ground and comes back to it.
+    # Frames to the nearest frame in which it stands.
     away = ndimage.distance_transform_edt(~stands) if stances else np.full(len(need), np.inf)
-    half = max(1, round(config.lift_s * fps))
-    wanted = need + config.clear_m * rotations.ease(np.minimum(away / half, 1.0))
+    half = max(1, round(_LIFT_S * fps))
+    wanted = need + _CLEAR_M * rotations.ease(np.minimum(away / half, 1.0))
     wanted = np.where(stands, 0.0, np.maximum(wanted, 0.0))
     highest = ndimage.maximum_filter1d(wanted, 2 * half + 1, mode="nearest")
     raised = smoothing.average(highest, half)
-    shift[:, 2] += np.minimum(raised, config.climb * away / fps)
+    shift[:, 2] += np.minimum(raised, _MAX_CLIMB_SPEED * away / fps)
 
 
 def _lowering(
@@ -276,7 +246,6 @@ def _lowering(
     ankles: FloatArray,
     root: FloatArray,
     fps: float,
-    config: TerrainFitConfig,
 ) -> FloatArray:
     """How far the root must be lowered for the legs to reach the ankles (n,) [m], smoothed."""
     from scipy import ndimage
@@ -284,7 +253,7 @@ def _lowering(
     need = np.zeros(len(root))
     for i, side in enumerate(FEET):
         thigh, shank, foot = (character.body(f"{side}_{x}") for x in ("thigh", "shank", "foot"))
-        length = config.straight * float(
+        length = _STRAIGHT * float(
             np.linalg.norm(character.offsets[shank]) + np.linalg.norm(character.offsets[foot])
         )
         before = np.linalg.norm(states.positions[:, thigh] - states.positions[:, foot], axis=1)
@@ -292,6 +261,6 @@ def _lowering(
         away = states.positions[:, thigh] + root - ankles[:, i]
         across = np.sum(away[:, :2] ** 2, axis=1)
         need = np.maximum(need, away[:, 2] - np.sqrt(np.maximum(reach**2 - across, 0.0)))
-    half = max(1, round(0.5 * config.follow_s * fps))
+    half = max(1, round(0.5 * _FOLLOW_S * fps))
     highest = ndimage.maximum_filter1d(need, 2 * half + 1, mode="nearest")
     return smoothing.average(highest, half)

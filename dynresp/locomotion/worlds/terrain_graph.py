@@ -1,7 +1,7 @@
-"""A motion graph laid out for walking over blocks: on which block each foot of each frame stands.
+"""A motion graph prepared for walks over blocks: the block on which each foot of each frame stands.
 
-A clip lies on the grid in whole blocks, whole levels and quarter turns, so where it is put is four
-whole numbers, its place: column, row, level, quarter turns.
+Clips are placed in whole blocks, whole levels and quarter turns. So a placement on the grid is four
+whole numbers, here called a cell placement: column, row, level, quarter turns.
 """
 
 from __future__ import annotations
@@ -20,38 +20,37 @@ from dynresp.support.arrays import LongArray
 from dynresp.support.errors import MotionError, UsageError
 from dynresp.support.runs import runs
 
-# A sole is flat if its heel is no higher than its ball by this [m], and the other way round.
+# A sole is flat if its heel and its ball differ in height by at most this [m].
 _FLAT = 0.03
-# Feet of the database may be off whole levels by this [m].
+# Feet of the database may be off whole levels by at most this [m].
 _OFF_LEVEL = 0.01
 
 
 class TerrainGraph:
-    """A motion graph laid out for walking over blocks. Made once, it serves any number of walks.
+    """A motion graph prepared for walks over blocks; made once for any number of walks.
 
     Attributes:
         graph: The graph.
-        character: Whose it is.
+        character: Its character.
         stands: (n, 2) whether a foot stands in a frame.
         blocks: (n, 2, 2) column and row of the block it stands on, in the clip's own world.
         levels: (n, 2) the level of that block.
-        over: (n, 2, 4) by how much its sole reaches over the edge of that block to +x, +y, -x, -y
-            [m]; negative where it keeps clear.
-
-        moves: (m, 4) of each way of the graph, where its target's clip is put seen from the clip
-            of its source: a place.
+        over: (n, 2, 4) how far its sole reaches over the edge of that block to +x, +y, -x, -y [m];
+            negative inside.
+        moves: (m, 4) of each jump of the graph, the cell placement of the target's clip seen from
+            the source's.
         planar: (n, 3) x, y [m] and yaw [rad] of the roots.
 
-    What is told of feet is the same for all frames of a stance. Arrays are read-only.
+    The entries of a foot are the same for all frames of a stance. Arrays are read-only.
     """
 
     def __init__(self, graph: MotionGraph, character: Character | None = None) -> None:
-        """Lay out a graph.
+        """Prepare a graph.
 
         Args:
             graph: In `Coordinates.BLOCKS`, of motions on a grid that begins at the origin; see
-                `blocks.onto_blocks`.
-            character: Whose it is, by default the product's own.
+                `recorded_terrain.onto_blocks`.
+            character: Its character, by default the product's own.
 
         Raises:
             UsageError: The graph is in other coordinates.
@@ -68,7 +67,7 @@ class TerrainGraph:
         self._unit = np.array([config.block_m, config.block_m, config.block_height_m, 0.5 * np.pi])
         self.stands = np.ascontiguousarray(database.contacts[:, :2])
         soles = sole_corners(self.character, self.character.kinematics(database.poses))
-        self._lay_out(soles)
+        self._find_blocks(soles)
         self.moves = np.round(graph.placements / self._unit).astype(np.int64)
         self.moves[:, 3] %= 4
         self.planar = np.ascontiguousarray(database.planar[:, [0, 1, 3]])
@@ -77,7 +76,7 @@ class TerrainGraph:
         ):  # fmt: skip
             array.flags.writeable = False
 
-    def _lay_out(self, soles: FloatArray) -> None:
+    def _find_blocks(self, soles: FloatArray) -> None:
         """Find the block of every stance."""
         n, block = len(soles), self.graph.config.block_m
         self.blocks = np.zeros((n, 2, 2), dtype=np.int64)
@@ -102,18 +101,18 @@ class TerrainGraph:
         if off.size and np.median(off) > _OFF_LEVEL:
             raise MotionError(
                 f"half of the standing feet are more than {np.median(off):.3f} m off whole levels; "
-                "bring the motions onto blocks first (blocks.onto_blocks)"
+                "bring the motions onto blocks first (recorded_terrain.onto_blocks)"
             )
 
     def standing(
         self, terrain: Terrain, frame: int, cell: npt.ArrayLike, turns: int
     ) -> LongArray | None:
-        """The place at which all standing feet of a frame stand on blocks, if there is one.
+        """The cell placement at which all standing feet of a frame stand on blocks; None if none.
 
         Args:
             terrain: The blocks.
             frame: A frame in which a foot stands.
-            cell: (2,) column and row of the place.
+            cell: (2,) its column and row.
             turns: Its quarter turns.
         """
         place = np.array([*np.asarray(cell), 0, turns], dtype=np.int64)
@@ -126,14 +125,14 @@ class TerrainGraph:
         return place
 
     def meters(self, terrain: Terrain, places: LongArray) -> FloatArray:
-        """Placements (..., 4) of places (..., 4) on a terrain."""
+        """Placements (..., 4) [m, rad] of cell placements (..., 4) on a terrain."""
         out = places * self._unit
         out[..., :2] += terrain.corner
         out[..., 3] = placement.wrapped(out[..., 3])
         return np.asarray(out)
 
     def place(self, terrain: Terrain, at: npt.ArrayLike) -> LongArray:
-        """The place (4,) of a placement (4,) on a terrain.
+        """The cell placement (4,) of a placement (4,) on a terrain.
 
         Raises:
             UsageError: It is not on the grid.
@@ -142,8 +141,8 @@ class TerrainGraph:
         out = np.round(moved).astype(np.int64)
         if not np.abs(moved - out).max() < 1e-6:
             raise UsageError(
-                f"a clip must be put in whole blocks, levels and quarter turns, got {list(moved)} "
-                "of them; start_on_terrain gives such a state"
+                f"a clip must be placed in whole blocks, levels and quarter turns, got "
+                f"{list(moved)}; start_on_terrain gives such a state"
             )
         out[3] %= 4
         return out
@@ -156,10 +155,10 @@ class TerrainGraph:
         Args:
             terrain: The blocks.
             frames: (k,) frames.
-            placements: (k, 4) where their clips are put: whole blocks and levels, quarter turns.
+            placements: (k, 4) placements of their clips: whole blocks and levels, quarter turns.
 
         Returns:
-            (k, 2, 2) column and row; -1 where a foot does not stand, or stands beside the grid.
+            (k, 2, 2) column and row; -1 if a foot does not stand, or stands beside the grid.
         """
         at = np.asarray(frames)
         middles = np.zeros((len(at), 2, 4))
@@ -178,5 +177,5 @@ class TerrainGraph:
         if (terrain.block_m, terrain.level_m) != (config.block_m, config.block_height_m):
             raise UsageError(
                 f"the graph has blocks of {config.block_m} and levels of {config.block_height_m} m,"
-                f" the terrain {terrain.block_m} and {terrain.level_m} m; they must be alike"
+                f" the terrain {terrain.block_m} and {terrain.level_m} m; they must be the same"
             )

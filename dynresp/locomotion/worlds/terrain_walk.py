@@ -22,7 +22,7 @@ import numpy.typing as npt
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.random_walk import check_in_component
 from dynresp.locomotion.playing.avatar_state import AvatarState
-from dynresp.locomotion.worlds.paths import as_path, as_place, check_length, resampled, window_m
+from dynresp.locomotion.worlds.paths import as_path, as_point, check_length, resampled, window_m
 from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.motion.rotations import FloatArray
@@ -153,7 +153,7 @@ def start_on_terrain(
     """
     graph.check(terrain)
     small = dataclasses.replace(config or TerrainWalkConfig(), budget=_STRETCH_BUDGET)
-    here, goal = as_place(at, "a start"), as_place(toward, "a place to face")
+    here, goal = as_point(at, "a start"), as_point(toward, "a place to face")
     frames = graph.graph.frames
     frames = frames[graph.stands[frames].any(axis=1)]
     cells, costs = [], []
@@ -200,7 +200,7 @@ def reach_on_terrain(
     Raises:
         UsageError: The start does not stand on the blocks, or the goal is not on the grid.
     """
-    end = as_place(goal, "a goal")
+    end = as_point(goal, "a goal")
     if np.isnan(terrain.height(end)):
         raise UsageError(
             f"a goal must be x and y inside the grid of {terrain.size[0]:g} x "

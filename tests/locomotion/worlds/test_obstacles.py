@@ -114,7 +114,7 @@ def test_what_is_no_world() -> None:
 
 @pytest.mark.parametrize("wrong", ["ab", None, 3.0, (1.0,), (1.0, "x"), [(1.0, 2.0)], (1, 2, 3)])
 def test_what_is_no_box_and_no_bounds(wrong: object) -> None:
-    with pytest.raises(UsageError, match="finite place, got"):
+    with pytest.raises(UsageError, match="must be finite numbers, got"):
         Obstacle(wrong, (1.0, 1.0))  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="sizes of an obstacle must be above 0"):
         Obstacle((0.0, 0.0), wrong)  # type: ignore[arg-type]

@@ -4,7 +4,7 @@ import pytest
 from dynresp.locomotion.worlds.path_kernel import nearest_on
 from dynresp.locomotion.worlds.paths import (
     as_path,
-    as_place,
+    as_point,
     check_length,
     distances_to,
     resampled,
@@ -36,7 +36,7 @@ def test_a_path_is_finite_and_not_too_long() -> None:
 @pytest.mark.parametrize("wrong", ["abc", None, 3.0, (1.0,), (1.0, np.nan), [(1.0, 2.0)], {}])
 def test_what_is_no_place(wrong: object) -> None:
     with pytest.raises(UsageError, match=r"a goal must be two finite numbers, x and y \[m\], got"):
-        as_place(wrong, "a goal")  # type: ignore[arg-type]
+        as_point(wrong, "a goal")  # type: ignore[arg-type]
 
 
 def test_what_is_done_of_a_path_never_becomes_less() -> None:

@@ -72,7 +72,7 @@ def test_contacts_are_found_where_they_were_planned(
 
 
 def test_nothing_is_in_the_stool(character: Character, motions: list[Motion]) -> None:
-    clear = body_clearances(stool_world(), character, motions[0].poses[::3], farthest=0.05)
+    clear = body_clearances(stool_world(), character, motions[0].poses[::3], max_distance=0.05)
     # Shanks brush over its edges in the long step, and a seat gives.
     assert clear.min() > -0.045
     assert (clear < -0.012).mean() < 0.01

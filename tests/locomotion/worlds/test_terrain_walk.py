@@ -11,7 +11,6 @@ from dynresp.locomotion.worlds.paths import distances_to
 from dynresp.locomotion.worlds.recorded_terrain import onto_blocks
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
 from dynresp.locomotion.worlds.terrain_fitting import (
-    TerrainFitConfig,
     compose_on_terrain,
     drawn_in,
     footing,
@@ -134,8 +133,6 @@ def test_other_worlds_are_refused(made: TerrainGraph, character: Character) -> N
 def test_numbers_that_make_no_sense_are_refused(name: str, value: float) -> None:
     with pytest.raises(UsageError, match=name):
         TerrainWalkConfig(**{name: value})
-    with pytest.raises(UsageError, match="climb"):
-        TerrainFitConfig(climb=0.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
