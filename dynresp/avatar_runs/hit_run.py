@@ -121,7 +121,7 @@ def hit_run(
         phases=recorder.phases(),
         about={
             "seed": seed,
-            "choice": choosing.about,
+            "choice": choosing.record,
             "returns": returns,
             "foot_skate_by_part_m": recorder.foot_slides(motion, character),
         },

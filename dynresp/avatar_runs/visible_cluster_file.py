@@ -1,8 +1,7 @@
-"""What control by video learns of a graph, kept in the user's cache folder.
+"""What following a video learns of a graph, kept in the user's cache folder.
 
-Silhouettes of every frame, clusters of what can be seen and what tells them from pictures take a
-minute to make, and follow from the graph alone. A file that is damaged, or that another version
-wrote, is made anew.
+Silhouettes of every frame, visible clusters, and the network that recognises them take a minute to
+make, and depend on the graph alone. A file that is damaged, or of another version, is replaced.
 """
 
 from __future__ import annotations
@@ -64,13 +63,13 @@ FORMAT = ArchiveFormat(
     max_text=100,
     max_bytes=1 << 28,
 )  # fmt: skip
-"""What a file of clusters, and of what tells them, holds."""
+"""The file of clusters and of the network that recognises them."""
 
-# Frames that something can be ago.
-_MOST_AGE = 10_000
+# Largest number of frames back in time.
+_MAX_AGE = 10_000
 # Squares and products of larger numbers overflow.
 _LARGEST = 1e100
-# What rounding adds to the logarithm of a probability.
+# Largest logarithm of a probability, above 0 by rounding.
 _ROUNDING = 1e-3
 
 _Made = TypeVar("_Made")
@@ -78,12 +77,12 @@ _Made = TypeVar("_Made")
 
 @dataclass(frozen=True, eq=False)
 class VideoModel:
-    """What is needed to follow somebody through a graph.
+    """What is needed to follow a person through a graph.
 
     Attributes:
-        forest: The ways open to the avatar, between clusters of what can be seen.
-        table: What the frames look like.
-        recogniser: Tells clusters from pictures.
+        forest: The avatar's paths between visible clusters.
+        table: Silhouettes of the frames.
+        recogniser: Recognises clusters from silhouettes.
     """
 
     forest: ClusterForest
@@ -99,14 +98,14 @@ class VideoModel:
         progress: Progress,
         remark: Callable[[str], None],
     ) -> VideoModel:
-        """Take what is kept of a graph; make and keep what is not.
+        """Load what the cache has of a graph; make and save the rest.
 
         Args:
             graph: The graph.
-            character: Whose motions it holds.
+            character: Its character.
             most: Most clusters.
-            progress: Told of what is made.
-            remark: Told why something could not be kept.
+            progress: Called with the stage, how many steps are done, and of how many.
+            remark: Called with the reason if something could not be saved.
 
         Raises:
             UsageError: `DYNRESP_CACHE` names something that is not a folder.
@@ -148,10 +147,10 @@ class VideoModel:
 
 
 def save_actions(path: Path, identity: str, clusters: Clusters, recogniser: Recogniser) -> None:
-    """Write clusters and what tells them.
+    """Write clusters and the network that recognises them.
 
     Raises:
-        GraphFileError: They are more than such a file may hold.
+        GraphFileError: They are larger than such a file may be.
         DynrespError: The file cannot be written.
     """
     mixture, curve = clusters.mixture, clusters.curve
@@ -181,14 +180,14 @@ def save_actions(path: Path, identity: str, clusters: Clusters, recogniser: Reco
 def load_actions(
     path: Path, identity: str, graph: MotionGraph, table: ViewTable
 ) -> tuple[Clusters, Recogniser]:
-    """Read the clusters of a graph and what tells them.
+    """Read the clusters of a graph and the network that recognises them.
 
     Raises:
         GraphFileError: The file cannot be read, or is of another graph.
     """
     a = FORMAT.read(path)
     if a["identity"].item() != identity:
-        FORMAT.fail(path, "tells the actions of another graph; delete it, and it is made anew")
+        FORMAT.fail(path, "has the actions of another graph; delete it, and it is made again")
     frames, count, width = len(graph.database), len(a["weights"]), len(a["first_biases"])
     seen = len(a["ages"]) * table.rows.shape[2]
     shapes = {
@@ -206,8 +205,8 @@ def load_actions(
         FORMAT.fail(path, "does not hold actions: its arrays do not fit together")
     if not _plausible(a):
         FORMAT.fail(path, "does not hold actions: some of its numbers make no sense")
-    if not (np.isin(a["examples"], graph.frames).all() and _within(a["ages"], _MOST_AGE)):
-        FORMAT.fail(path, "does not hold actions: it names frames that are not there")
+    if not (np.isin(a["examples"], graph.frames).all() and _within(a["ages"], _MAX_AGE)):
+        FORMAT.fail(path, "does not hold actions: it names frames that the graph does not have")
     clusters = Clusters(
         Mixture(a["weights"].copy(), a["means"].copy(), a["variances"].copy()),
         a["labels"].copy(),
@@ -224,8 +223,8 @@ def load_actions(
 
 
 def _plausible(a: Arrays) -> bool:
-    """Whether numbers are what learning can give, in arrays that fit together."""
-    # A bias may be minus infinity: that of a cluster to which no frame belongs.
+    """Whether learning can give these numbers; the arrays fit together."""
+    # The bias of a cluster without frames is minus infinity.
     biases, logs = a["last_biases"], a["log_probabilities"]
     biases = biases[biases != -np.inf]
     finite = [a[x] for x in ("weights", "means", "variances", "curve")]
@@ -249,7 +248,7 @@ def _within(numbers: np.ndarray, end: int) -> bool:
 
 
 def _identity(graph: MotionGraph, table: ViewTable, most: int) -> str:
-    """Short hash of all that clusters, and what tells them, follow from."""
+    """Short hash of everything that clusters and network depend on."""
     text = f"{graph_identity(graph)} {table.identity} {most} {CLUSTERING_VERSION}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -261,7 +260,7 @@ def _kept(
     save: Callable[[_Made, Path], None],
     remark: Callable[[str], None],
 ) -> _Made:
-    """What a file holds; where there is none that can be read, it is made and written."""
+    """Load a file; if it cannot be read, make its content and write it."""
     try:
         return load(path)
     except GraphFileError:

@@ -1,4 +1,4 @@
-"""World files: boxes on level ground, for avatars to walk around (`docs/worlds.md`)."""
+"""World files: boxes on level ground that avatars walk around (`docs/worlds.md`)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynresp.support.errors import SpecError, UsageError
 
 
 def _numbers(count: int, unit: str) -> BeforeValidator:
-    """For a field that is a list of so many finite numbers."""
+    """For a field that is a list of `count` finite numbers."""
 
     def check(given: Any) -> tuple[float, ...]:
         right = isinstance(given, list | tuple) and len(given) == count
@@ -30,7 +30,7 @@ def _numbers(count: int, unit: str) -> BeforeValidator:
 
 
 class WorldTable(Strict):
-    """`[world]`: how far the ground reaches."""
+    """`[world]`: the bounds of the ground."""
 
     bounds: Annotated[tuple[float, float, float, float], _numbers(4, "(x, y, x, y) [m]")]
 
@@ -64,7 +64,7 @@ def read_world(path: Path | str) -> World:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    said = read_spec(WorldFile, Path(path), "a world file", _HINTS)
+    spec = read_spec(WorldFile, Path(path), "a world file", _HINTS)
     try:
         boxes = [
             Obstacle(
@@ -73,8 +73,8 @@ def read_world(path: Path | str) -> World:
                 math.radians(box.turn_deg),
                 box.height_m,
             )
-            for box in said.box
+            for box in spec.box
         ]
-        return World(said.world.bounds, tuple(boxes))
+        return World(spec.world.bounds, tuple(boxes))
     except UsageError as error:
         raise SpecError(f"{path}: {error}") from None

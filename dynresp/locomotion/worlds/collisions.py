@@ -1,4 +1,4 @@
-"""Which footprints overlap the boxes of a world, fast."""
+"""Fast collision test: which footprints overlap the boxes of a world."""
 
 from __future__ import annotations
 
@@ -12,25 +12,24 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
 from dynresp.support.errors import UsageError
 
-# Most boxes in the lists of all cells: 400 MB, and below the 2^31 that `CollisionGrid.starts` can
-# count.
-_MOST_MEMBERS = 100_000_000
+# Most boxes in the lists of all cells: 400 MB, and below 2^31, the limit of `CollisionGrid.starts`.
+_MAX_MEMBERS = 100_000_000
 # Half the diagonal of a cell of side 1, and a little more.
 _DIAGONAL = 0.7072
 
 
 @dataclass(frozen=True, eq=False)
 class CollisionGrid:
-    """A world laid out for the collision test. Arrays are read-only.
+    """A world prepared for the collision test. Arrays are read-only.
 
     Attributes:
         frame: (3,) x and y of the grid's corner, side of its cells [m].
-        clearance: (columns, rows) distance from the middle of each cell to the nearest box [m]; of
-            those that are farther than anything reaches, any larger number.
+        clearance: (columns, rows) distance from the middle of each cell to the nearest box [m];
+            beyond `reach_m` any larger number.
         starts: (columns * rows + 1,) where the boxes near each cell begin in `members`.
         members: (k,) boxes.
         boxes: (n, 6) rows of `World.boxes`.
-        reach_m: Up to where boxes are near to a point [m].
+        reach_m: Largest distance at which a box counts as near [m].
     """
 
     frame: FloatArray
@@ -47,16 +46,16 @@ class CollisionGrid:
 
     @property
     def arrays(self) -> tuple[npt.NDArray, ...]:  # type: ignore[type-arg]
-        """What the kernels take, in their order."""
+        """The arguments of the kernels, in their order."""
         return self.frame, self.clearance, self.starts, self.members, self.boxes
 
     @classmethod
     def of(cls, world: World, reach_m: float, cell_m: float = 0.2) -> CollisionGrid:
-        """Lay out a world. The time is that of looking at the cells about each box.
+        """Prepare a world; the time grows with the number of cells near boxes.
 
         Args:
             world: The boxes.
-            reach_m: Bodies cover no ground farther than this from their root [m], margins
+            reach_m: Largest distance of the ground that a body covers from its root [m], margins
                 included.
             cell_m: Side of the grid's cells [m].
 
@@ -74,10 +73,10 @@ class CollisionGrid:
         counts = np.zeros(columns * rows, dtype=np.int64)
         count_kernel(world.boxes, windows, frame, near, clearance, counts)
         total = int(counts.sum())
-        if total > _MOST_MEMBERS:
+        if total > _MAX_MEMBERS:
             raise UsageError(
                 f"the lists of boxes within reach ({reach_m:g} m) of each cell ({cell_m:g} m) "
-                f"would hold {total}, at most {_MOST_MEMBERS} are allowed; leave out boxes that "
+                f"would hold {total}, at most {_MAX_MEMBERS} are allowed; leave out boxes that "
                 "others cover, or choose larger cells"
             )
         starts = np.zeros(columns * rows + 1, dtype=np.int64)
@@ -110,10 +109,10 @@ class CollisionGrid:
         Args:
             roots: (n, 3) x, y [m] and yaw [rad].
             footprints: (n, 4); see `dynresp.locomotion.worlds.footprints`.
-            margin_m: By how much they are widened on all sides [m].
+            margin_m: How far they are widened on all sides [m].
 
         Returns:
-            (n,).
+            (n,) bool.
         """
         # Numba takes a third of a second to import, the kernel longer when first compiled.
         from dynresp.locomotion.worlds.collision_kernel import collisions_kernel
@@ -128,7 +127,7 @@ class CollisionGrid:
 def _windows(
     boxes: FloatArray, frame: FloatArray, near: float, shape: tuple[int, int]
 ) -> npt.NDArray[np.int64]:
-    """(n, 4) first and last column, first and last row of the cells that may be near to a box."""
+    """(n, 4) first and last column, first and last row of the cells that may be near each box."""
     c, s = np.abs(boxes[:, 4]), np.abs(boxes[:, 5])
     halves = np.stack(
         [c * boxes[:, 2] + s * boxes[:, 3], s * boxes[:, 2] + c * boxes[:, 3]], axis=1
@@ -136,7 +135,7 @@ def _windows(
     low = np.floor((boxes[:, :2] - halves - near - frame[:2]) / frame[2])
     high = np.floor((boxes[:, :2] + halves + near - frame[:2]) / frame[2])
     last = np.array(shape) - 1.0
-    # Before they become whole numbers: boxes may be larger than those can tell.
+    # Clipped before they become whole numbers, which cannot hold the largest boxes.
     low, high = np.clip(low, 0.0, last + 1.0), np.clip(high, -1.0, last)
     windows = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
     return np.ascontiguousarray(windows.astype(np.int64))

@@ -12,16 +12,16 @@ from dynresp.motion.rotations import FloatArray
 
 
 def footprints(character: Character, poses: npt.ArrayLike) -> FloatArray:
-    """How far the body reaches over the ground, pose by pose.
+    """The ground that the body covers in each pose.
 
     Args:
-        character: Whose poses they are.
+        character: The character.
         poses: (frames, 59).
 
     Returns:
-        (frames, 4) how far its geoms reach back, forward, right and left of the root [m]: least
-        x, largest x, least y and largest y in the frame that has its origin under the root and
-        its x where the root faces.
+        (frames, 4) how far its geoms reach back, forward, right and left of the root [m]:
+        smallest x, largest x, smallest y and largest y in the frame that has its origin under the
+        root and its x axis where the root faces.
     """
     # Numba takes a third of a second to import, the kernel longer when first compiled.
     from dynresp.locomotion.worlds.footprint_kernel import footprints_kernel
@@ -33,7 +33,7 @@ def footprints(character: Character, poses: npt.ArrayLike) -> FloatArray:
 
 
 def body_arrays(character: Character) -> tuple[npt.NDArray[Any], ...]:
-    """What the kernels need to know of a body.
+    """What the kernels need of a character.
 
     Returns:
         Parents (bodies,) and offsets (bodies, 3) of its bodies, as of `Character`; then for each

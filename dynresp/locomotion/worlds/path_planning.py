@@ -1,4 +1,4 @@
-"""Paths over the ground that keep clear of boxes: planned to a goal, or fitted to a sketch."""
+"""Paths over the ground that keep away from boxes: planned to a goal, or fitted to a sketch."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from dynresp.support.arrays import IndexArray
 from dynresp.support.checks import check_numbers
 from dynresp.support.errors import DynrespError, UsageError
 
-# Steps to half of the eight neighbours of a cell; the other half are the same ways back.
+# Steps to half of the eight neighbours of a cell; the other half are the same steps back.
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
-# How often a path is smoothed: by about half a metre when planned, a quarter of one when it is to
+# How often a path is smoothed: over about half a metre if planned, a quarter of a metre if it must
 # stay near a sketch.
 _SMOOTHINGS_PLANNED, _SMOOTHINGS_FITTED = 60, 15
-# Most states that are looked at around a sketch, each of about 1 kB: those 1 m around 2.5 km, or
-# 4 m around 160 m.
-_MOST_STATES = 4_000_000
-# Discs to keep out of are looked at in every cell.
-_MOST_DISC_CELLS = 500_000_000
+# Most states of a search around a sketch, each of about 1 kB: those within 1 m of 2.5 km, or within
+# 4 m of 160 m.
+_MAX_STATES = 4_000_000
+# Most cells times discs: every disc is compared with every cell.
+_MAX_DISC_CELLS = 500_000_000
 
 
 @dataclass(frozen=True)
@@ -32,17 +32,17 @@ class PlanningConfig:
     """What a good path is.
 
     Attributes:
-        resolution_m: Side of the cells of the grid it is planned on, and about the distance
-            between the points of the path [m].
-        narrow_m: It never comes nearer to a box than this [m]: half of what a body needs sideways.
-        comfort_m: Farther than this from a box all places are alike [m].
-        dislike: A metre right at `narrow_m` counts as 1 + dislike metres.
+        resolution_m: Side of the cells of the grid, and about the distance between the points of
+            the path [m].
+        narrow_m: Smallest distance from a box [m]: half the width that a body needs.
+        comfort_m: From this distance from a box on, distance costs nothing [m].
+        dislike: A metre at `narrow_m` from a box counts as 1 + dislike metres.
         pull: A metre at a distance d from the sketch counts as 1 + pull d^2 metres [1/m^2].
-        reach_m: How far from a sketch a way around is looked for [m]; four times as far where
-            there is none.
+        reach_m: Largest distance from a sketch of a path around obstacles [m]; four times as much
+            if there is none.
 
     Raises:
-        UsageError: A number makes no sense.
+        UsageError: A number is out of range.
     """
 
     resolution_m: float = 0.1
@@ -71,12 +71,11 @@ class _Grid:
         self.config = config
         self.low = np.array(world.bounds[:2])
         self.shape = world.grid_shape(config.resolution_m)
-        if self.cells * len(blocked) > _MOST_DISC_CELLS:
+        if self.cells * len(blocked) > _MAX_DISC_CELLS:
             raise UsageError(
-                f"{len(blocked)} discs in {self.cells} cells are too much to keep out of: at most "
-                f"{_MOST_DISC_CELLS} cells times a disc; put obstacles into the world instead"
+                f"{len(blocked)} discs in {self.cells} cells are too many: their product may be "
+                f"at most {_MAX_DISC_CELLS}; put obstacles into the world instead"
             )
-        # Farther away all places are alike.
         self.boxes = CollisionGrid.of(world, config.comfort_m, config.resolution_m)
         self.blocked = blocked
         index = np.stack(np.unravel_index(np.arange(self.cells), self.shape), axis=1)
@@ -106,7 +105,7 @@ class _Grid:
         """The free cell nearest to a point.
 
         Raises:
-            DynrespError: Nothing is free within two metres.
+            DynrespError: No cell is free within two metres.
         """
         away = np.hypot(*(self.middles - point).T)
         away[~self.free] = np.inf
@@ -118,8 +117,8 @@ class _Grid:
             )
         return cell
 
-    def ways(self) -> tuple[IndexArray, IndexArray, FloatArray]:
-        """Pairs of neighbouring free cells, one of each two ways, and what they cost."""
+    def edges(self) -> tuple[IndexArray, IndexArray, FloatArray]:
+        """Pairs of neighbouring free cells, each in one direction, and what a step costs."""
         index = np.arange(self.cells).reshape(self.shape)
         starts, stops, costs = [], [], []
         for dx, dy in _STEPS:
@@ -146,12 +145,12 @@ def plan_path(
     Args:
         world: The boxes.
         start: (2,) where it begins [m].
-        goal: (2,) where it is to end [m].
+        goal: (2,) where it ends [m].
         config: What a good path is.
         blocked: (n, 3) discs to keep out of: x, y and radius [m].
 
     Returns:
-        (k, 2) points about `resolution_m` apart, from the free place nearest to the start to that
+        (k, 2) points about `resolution_m` apart, from the free point nearest to the start to that
         nearest to the goal.
 
     Raises:
@@ -165,7 +164,7 @@ def plan_path(
     ends = np.stack([as_point(start, "a start"), as_point(goal, "a goal")])
     grid = _Grid(world, config, np.asarray(blocked, dtype=np.float64).reshape(-1, 3))
     first, last = grid.nearest_free(ends[0], "start"), grid.nearest_free(ends[1], "goal")
-    a, b, costs = grid.ways()
+    a, b, costs = grid.edges()
     ways = csr_array((costs, (a, b)), shape=(grid.cells, grid.cells))
     _, before = dijkstra(ways, directed=False, indices=[first], return_predecessors=True)
     if first != last and before[0, last] < 0:
@@ -185,11 +184,11 @@ def fit_path(
     config: PlanningConfig | None = None,
     blocked: npt.ArrayLike = (),
 ) -> FloatArray:
-    """The path with clearance that is nearest to a sketch, which may touch or cut obstacles.
+    """The path with clearance nearest to a sketch, which may touch or cut obstacles.
 
-    The shortest way in the product of the grid and the sketch: a state is a cell and how much of
-    the sketch is done, so that the sketch is walked from one end to the other, loops included,
-    whatever is near to it on the other side of a wall.
+    The shortest path in the product of the grid and the sketch: a state is a cell and how much of
+    the sketch is done. So the sketch is followed from one end to the other, loops included, and a
+    part of it behind a wall is no short cut.
 
     Args:
         world: The boxes.
@@ -198,13 +197,13 @@ def fit_path(
         blocked: (n, 3) discs to keep out of: x, y and radius [m].
 
     Returns:
-        (k, 2) as of `plan_path`. Where the sketch is cut off from its goal by obstacles larger
-        than is looked around, the path is planned from its start to its end.
+        (k, 2) as of `plan_path`. If obstacles are too large to go around within four times
+        `reach_m`, the path is planned from the sketch's start to its end.
 
     Raises:
         UsageError: The world has too many cells of `resolution_m`, or the sketch is so long that
-            there is too much to look at within `reach_m` of it, or, where obstacles cut it off,
-            within four times that.
+            too many cells are within `reach_m` of it, or, if obstacles cut it off, within four
+            times that.
         DynrespError: There is no way, or no free ground near the start or the goal.
     """
     from scipy.sparse import csr_array
@@ -216,22 +215,22 @@ def fit_path(
     grid = _Grid(world, config, discs)
     points = resampled(sketch, 2.0 * config.resolution_m)
     first, last = grid.nearest_free(points[0], "start"), grid.nearest_free(points[-1], "goal")
-    a, b, costs = grid.ways()
+    a, b, costs = grid.edges()
     free = np.flatnonzero(grid.free)
     tree = cKDTree(grid.middles[free])
     for reach in (config.reach_m, 4.0 * config.reach_m):
         states = int(np.sum(tree.query_ball_point(points, reach, return_length=True)))
-        if states > _MOST_STATES:
+        if states > _MAX_STATES:
             length = np.hypot(*np.diff(points, axis=0).T).sum()
             raise UsageError(
-                f"a sketch {length:.1f} m long is too long to look for ways {reach:g} m around it "
+                f"a sketch {length:.1f} m long is too long to search {reach:g} m around it "
                 f"in cells of {config.resolution_m:g} m; cut it, draw it around the obstacles, or "
                 "choose a smaller reach_m or a larger resolution_m"
             )
         inside = [free[tree.query_ball_point(point, reach)] for point in points]
         keys, away = _near(grid, points, inside, first, last)
         layer, cell = np.divmod(keys, grid.cells)
-        # Along the grid within a layer, at what the places of the layer cost.
+        # Steps along the grid within a layer.
         count = np.bincount(cell, minlength=grid.cells)
         rows, columns, weights = [], [], []
         order = np.argsort(cell, kind="stable")
@@ -249,7 +248,7 @@ def fit_path(
             rows.append(one)
             columns.append(other)
             weights.append(costs[way] * pulled)
-        # On to the next point of the sketch, staying where one is.
+        # To the next point of the sketch, in the same cell.
         next_key = keys + grid.cells
         target = np.searchsorted(keys, next_key)
         found = (target < len(keys)) & (keys[np.minimum(target, len(keys) - 1)] == next_key)
@@ -279,7 +278,7 @@ def _near(
         grid: The cells.
         points: (k, 2) points of the sketch.
         inside: For each point the cells within reach.
-        first: The cell of the start, taken in wherever it is.
+        first: The cell of the start, included wherever it is.
         last: The cell of the goal.
     """
     inside = [*inside]
@@ -291,7 +290,7 @@ def _near(
 
 
 def _trace(before: npt.NDArray[np.int32], last: int) -> list[int]:
-    """From the source of a tree of shortest ways to a node."""
+    """The nodes from the source of a tree of shortest paths to a node."""
     path = [last]
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
@@ -299,7 +298,7 @@ def _trace(before: npt.NDArray[np.int32], last: int) -> list[int]:
 
 
 def _with_ends(grid: _Grid, path: FloatArray, ends: FloatArray) -> FloatArray:
-    """The path with its ends moved to where they were asked for (2, 2), if that is free ground."""
+    """The path with its ends moved to the wanted ends (2, 2), if they are on free ground."""
     path = path.copy() if len(path) > 1 else np.repeat(path, 2, axis=0)
     free = grid.clearance_at(ends) >= grid.config.narrow_m
     for where, end, is_free in zip((0, -1), ends, free, strict=True):
@@ -309,7 +308,7 @@ def _with_ends(grid: _Grid, path: FloatArray, ends: FloatArray) -> FloatArray:
 
 
 def _smooth(grid: _Grid, path: FloatArray, times: int) -> FloatArray:
-    """Draw points to the middle between their neighbours where that keeps them clear."""
+    """Move points to the middle between their neighbours where that keeps the clearance."""
     path = resampled(path, grid.config.resolution_m)
     clearance = grid.clearance_at(path)
     for _ in range(times):

@@ -1,13 +1,13 @@
-"""An avatar on rough terrain: it walks where its user points, and stands on blocks alone.
+"""Walks over rough terrain: to a goal, along a path, or at random, with every stance on a block.
 
-The graph is one in `Coordinates.BLOCKS`, of motion recorded over blocks (Lee et al. 2002, sections
-4.1.2 and 6). The way is found by best-first search with eq. 8 as the objective, and backtracking:
-what waits in the heap is any state reached so far, not only where the avatar is. A way is taken
-only if each foot that stands in it stands on a block.
+The graph is in `Coordinates.BLOCKS`, of motion recorded over blocks (Lee et al. 2002, sections
+4.1.2 and 6). The walk is found by best-first search with eq. 8 as the objective, and
+backtracking: any state reached so far may be continued. A step is allowed only if
+each standing foot is on a block.
 
-45 s of recorded walking hold few of the steps that a terrain asks for. So a stance may be higher or
+45 s of recorded walking have few of the steps that a terrain needs. So a stance may be higher or
 lower than recorded by whole levels, if the one before it is nearly as much, and a foot that would
-stick out over an edge may be drawn in; both cost, and `terrain_fitting` bends the legs for it.
+stick out over an edge may be drawn in. Both cost, and `terrain_fitting` bends the legs accordingly.
 """
 
 from __future__ import annotations
@@ -32,43 +32,43 @@ from dynresp.support.errors import UsageError
 
 # Distance of the points of a path [m].
 _SPACING = 0.1
-# Starts that are tried, and for how long one must be able to go on [s].
-_STARTS, _ON_S = 300, 4.0
-# Most states looked at for a start, and for a stretch of a walk at random.
+# Most starts that are tried, and how long a walk from one must be [s].
+_STARTS, _MIN_WALK_S = 300, 4.0
+# Most states of the search for a start, and for one stretch of a random walk.
 _STRETCH_BUDGET = 10_000
-# How far away the next place of a walk at random is [m], how many are tried before a stretch is
-# taken back, and how many stretches are.
-_NEAREST_M, _FARTHEST_M, _TRIES = 1.5, 6.0, 20
-# What eq. 8 counts against the costs: where the budget was spent, the search begins anew greedier.
+# Distance of the next goal of a random walk [m], from and to. The last number is how many goals are
+# tried before a stretch is taken back, and how many stretches are taken back at most.
+_MIN_GOAL_M, _MAX_GOAL_M, _TRIES = 1.5, 6.0, 20
+# Weights of eq. 8 against the costs: after the budget is spent, the search starts again greedier.
 _GREED = (1.0, 2.0, 4.0, 8.0)
-# What a turn away from the wanted direction counts when a start is chosen [m/rad].
+# Cost of facing away from the wanted direction when a start is chosen [m/rad].
 _TURN = 0.3
 
 
 @dataclass(frozen=True)
 class TerrainWalkConfig:
-    """What a good way over blocks is, and how long one is looked for.
+    """What a good walk over blocks is, and how long to search for one.
 
     Attributes:
         facing: c of eq. 8, at least 0 and below 1.
-        ahead_m: How far ahead on a path the point is that the avatar should face [m].
-        pace: What a second costs [m].
+        ahead_m: The avatar should face the point of the path this far ahead [m].
+        pace: Cost of a second [m].
         stray: At a distance d from a path a second costs 1 + stray d^2 times as much [1/m^2].
-        farthest_m: Ways that lead farther from a path than this are dropped [m].
-        jump: What a jump costs for each unit of its distance (eq. 2) [m].
-        hurry: What it costs besides if it comes at once after another [m],
-        haste_s: falling to nothing when it is this much later [s].
-        adapt: By how many levels a stance may be higher or lower than recorded, seen from the
-            other foot's last; 0 allows recorded steps alone.
-        stretch: What that costs for each squared level [m].
-        draw_m: How far a foot is drawn in from an edge at most [m].
-        draw: What a metre of that costs [m].
-        edge_m: Distance that soles are to keep from edges [m].
-        arrival_m: How near to the end the root must come [m].
-        budget: Most states to go on from; then the search begins anew, greedier, some times.
+        farthest_m: Largest distance from a path [m].
+        jump: Cost of a jump for each unit of its distance (eq. 2) [m].
+        hurry: Further cost of a jump right after another [m].
+        haste_s: Time between two jumps at which that cost has fallen to 0 [s].
+        adapt: Most levels by which a stance may be higher or lower than recorded, seen from the
+            last stance of the other foot; 0 allows recorded steps only.
+        stretch: Cost of that for each squared level [m].
+        draw_m: Largest distance by which a foot is drawn in from an edge [m].
+        draw: Cost of a metre of that [m].
+        edge_m: Distance that soles keep from edges [m].
+        arrival_m: Largest distance of the root from the end at arrival [m].
+        budget: Most states to continue; then the search starts again, greedier, up to three times.
 
     Raises:
-        UsageError: A number makes no sense.
+        UsageError: A number is out of range.
     """
 
     facing: float = 0.2
@@ -107,17 +107,15 @@ class TerrainWalk:
 
     Attributes:
         frames: (k,) the walk, beginning with the frame of the start.
-        placements: (k, 4) where their clips are put: whole blocks and levels, quarter turns. Where
-            steps are not as high as recorded they rise and sink, so that what stands is as near to
-            its blocks as can be.
-        roots: (k, 4) x, y, z [m] and yaw [rad] of the root, as recorded and put there.
-        blocks: (k, 2, 2) column and row of the block on which each foot stands; -1 where it does
-            not stand.
-        arrived: Whether it goes as far as asked; if not, the terrain offers no way on, or the
-            budget was spent.
-        off_goal: Distance of the last root from the goal [m]; not a number where there is none.
-        looked: States gone on from.
-        taken_back: Stretches of a walk at random that were taken back because they led nowhere.
+        placements: (k, 4) placements of their clips: whole blocks and levels, quarter turns. Where
+            steps are not as high as recorded, the height is the mean of the standing feet's levels.
+        roots: (k, 4) x, y, z [m] and yaw [rad] of the root, as recorded and placed.
+        blocks: (k, 2, 2) column and row of the block on which each foot stands; -1 if it does not
+            stand.
+        arrived: Whether it reaches the end; if not, there is no way on, or the budget was spent.
+        off_goal: Distance of the last root from the goal [m]; NaN without a goal.
+        looked: States that the search continued.
+        taken_back: Stretches of a random walk that were taken back because they led nowhere.
         planning_s: Time that the search took [s].
     """
 
@@ -139,21 +137,21 @@ def start_on_terrain(
     toward: npt.ArrayLike,
     config: TerrainWalkConfig | None = None,
 ) -> AvatarState:
-    """A state to begin from: standing near a place, facing another, and with a way on.
+    """Find a state to begin from: it stands near a point, faces another, and has a way on.
 
     Args:
-        graph: Whose frames.
+        graph: The prepared graph.
         terrain: The blocks.
         at: (2,) where the root should be [m].
         toward: (2,) what it should face [m].
-        config: What a good way is.
+        config: What a good walk is.
 
     Raises:
         UsageError: No frame of the graph stands on the blocks there and can go on.
     """
     graph.check(terrain)
     small = dataclasses.replace(config or TerrainWalkConfig(), budget=_STRETCH_BUDGET)
-    here, goal = as_point(at, "a start"), as_point(toward, "a place to face")
+    here, goal = as_point(at, "a start"), as_point(toward, "a point to face")
     frames = graph.graph.frames
     frames = frames[graph.stands[frames].any(axis=1)]
     cells, costs = [], []
@@ -172,11 +170,11 @@ def start_on_terrain(
         if place is not None:
             state = AvatarState(frame, graph.meters(terrain, place))
             found = _search(graph, terrain, state, goal[None], small)
-            if found.arrived or len(found.frames) > _ON_S * graph.graph.database.fps:
+            if found.arrived or len(found.frames) > _MIN_WALK_S * graph.graph.database.fps:
                 return state
     raise UsageError(
-        f"no frame of the graph stands on the blocks about {here} and goes on from there; take "
-        f"a place inside the grid of {terrain.size[0]:g} x {terrain.size[1]:g} m, away from its "
+        f"no frame of the graph stands on the blocks near {here} and goes on from there; take "
+        f"a point inside the grid of {terrain.size[0]:g} x {terrain.size[1]:g} m, away from its "
         "border"
     )
 
@@ -188,14 +186,14 @@ def reach_on_terrain(
     goal: npt.ArrayLike,
     config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
-    """Walk to a place.
+    """Walk to a goal.
 
     Args:
-        graph: Where the avatar walks through.
+        graph: The prepared graph.
         terrain: The blocks.
         start: Where it is; see `start_on_terrain`.
-        goal: (2,) the place [m].
-        config: What a good way is.
+        goal: (2,) the goal [m].
+        config: What a good walk is.
 
     Raises:
         UsageError: The start does not stand on the blocks, or the goal is not on the grid.
@@ -219,15 +217,15 @@ def follow_on_terrain(
     """Walk along a sketched path.
 
     Args:
-        graph: Where the avatar walks through.
+        graph: The prepared graph.
         terrain: The blocks.
         start: Where it is; see `start_on_terrain`. The path begins there even if the sketch
             does not.
         sketch: (k, 2) corners of a path on the ground [m].
-        config: What a good way is.
+        config: What a good walk is.
 
     Raises:
-        UsageError: The start does not stand on the blocks, or the sketch is none.
+        UsageError: The start does not stand on the blocks, or the sketch is not a path.
     """
     root = start.root(graph.graph)[:2]
     corners = as_path(sketch, "a sketch")
@@ -246,22 +244,22 @@ def wander_on_terrain(
     rng: np.random.Generator,
     config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
-    """Walk from one place to the next, all drawn at random.
+    """Walk from one random goal to the next.
 
-    A step by step draw, as on level ground, would come to the next block in a stride that does not
-    fit it, and jump at the last moment. Here each stretch is planned to its end. Where no further
-    place can be reached, the last stretch is taken back.
+    Drawing step by step, as on level ground, would reach the next block with a stride that does not
+    fit, and jump at the last moment. So each stretch is planned to its goal. If no further goal can
+    be reached, the last stretch is taken back.
 
     Args:
-        graph: Where the avatar walks through.
+        graph: The prepared graph.
         terrain: The blocks.
         start: Where it is; see `start_on_terrain`.
-        frames: How many frames to walk.
-        rng: Source of chance.
-        config: What a good way is; `budget` is for each stretch.
+        frames: Number of frames to walk.
+        rng: Source of random numbers.
+        config: What a good walk is; `budget` is for each stretch.
 
     Returns:
-        The walk; shorter, and `arrived` false, where no place drawn can be reached from the start.
+        The walk; shorter, with `arrived` false, if no goal can be reached from the start.
 
     Raises:
         UsageError: The start does not stand on the blocks, or there is no frame to walk.
@@ -276,7 +274,7 @@ def wander_on_terrain(
         at = start
         if stretches:
             at = AvatarState(int(stretches[-1].frames[-1]), stretches[-1].placements[-1])
-        goal = _place_at_random(terrain, at.root(graph.graph)[:2], rng)
+        goal = _random_goal(terrain, at.root(graph.graph)[:2], rng)
         found = reach_on_terrain(graph, terrain, at, goal, config)
         looked += found.looked
         tried += 1
@@ -298,11 +296,11 @@ def wander_on_terrain(
     )  # fmt: skip
 
 
-def _place_at_random(terrain: Terrain, here: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A place on the grid, some metres away where the grid is so large."""
+def _random_goal(terrain: Terrain, here: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A point on the grid, 1.5 to 6 m away if the grid is large enough."""
     for _ in range(_TRIES):
         place = terrain.corner + rng.random(2) * terrain.size
-        if _NEAREST_M <= np.hypot(*(place - here)) <= _FARTHEST_M:
+        if _MIN_GOAL_M <= np.hypot(*(place - here)) <= _MAX_GOAL_M:
             break
     return np.asarray(place)
 
@@ -336,7 +334,7 @@ def _search(
 def _begin(
     graph: TerrainGraph, terrain: Terrain, start: AvatarState, config: TerrainWalkConfig
 ) -> tuple[LongArray, tuple[npt.NDArray, ...], FloatArray]:  # type: ignore[type-arg]
-    """The place, the feet and the settings with which a kernel begins."""
+    """The start, the feet and the settings for the kernel."""
     from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
 
     graph.check(terrain)

@@ -99,12 +99,12 @@ def test_grids_that_would_be_too_large_are_refused() -> None:
 
 def test_what_is_looked_at_around_a_sketch_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     # Enough for a first look; the second is four times as wide.
-    monkeypatch.setattr(planning, "_MOST_STATES", 20_000)
+    monkeypatch.setattr(planning, "_MAX_STATES", 20_000)
     assert WALL.distances(fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])).min() > 0.2
-    with pytest.raises(UsageError, match=r"8\.0 m long is too long to look for ways 4 m around"):
+    with pytest.raises(UsageError, match=r"8\.0 m long is too long to search 4 m around"):
         fit_path(WALL, [(0.0, -1.5), (8.0, -1.5)])
-    monkeypatch.setattr(planning, "_MOST_STATES", 2_000)
-    with pytest.raises(UsageError, match=r"too long to look for ways 1 m around .* reach_m"):
+    monkeypatch.setattr(planning, "_MAX_STATES", 2_000)
+    with pytest.raises(UsageError, match=r"too long to search 1 m around .* reach_m"):
         fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])
 
 

@@ -64,7 +64,7 @@ def test_sizes_that_make_no_sense_are_refused() -> None:
         Terrain(LEVELS, block_m=0.0)
     with pytest.raises(UsageError, match="finite place"):
         Terrain(LEVELS, corner=(np.nan, 0.0))
-    with pytest.raises(UsageError, match="a column and a row"):
+    with pytest.raises(UsageError, match="one column and one row"):
         Terrain.random(np.random.default_rng(0), 0, 3)
 
 

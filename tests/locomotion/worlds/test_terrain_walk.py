@@ -112,7 +112,7 @@ def test_other_worlds_are_refused(made: TerrainGraph, character: Character) -> N
     hovering = Motion(poses, motion.fps, "hovering", motion.contacts)
     with pytest.raises(MotionError, match="off whole levels"):
         TerrainGraph(MotionGraph.build([hovering], BLOCKS), character)
-    with pytest.raises(UsageError, match="must be alike"):
+    with pytest.raises(UsageError, match="must be the same"):
         start_on_terrain(made, Terrain(LEVELS, level_m=0.1), [1, 1], [2, 2])
     terrain = Terrain(np.zeros((8, 8), dtype=np.int64))
     start = start_on_terrain(made, terrain, [2.4, 2.4], [4.0, 2.4])
