@@ -1,4 +1,4 @@
-"""All commands together, and what becomes of their errors."""
+"""All commands, and how their errors become messages and exit codes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynresp.support.errors import DynrespError
 
 
 class Commands(TyperGroup):
-    """Turns the product's errors into a message and an exit code."""
+    """Turns errors into a message and an exit code."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
@@ -25,16 +25,19 @@ class Commands(TyperGroup):
             typer.echo(f"dynresp: {error}", err=True)
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
-            # `dynresp.cli.main` says it.
+            # `dynresp.cli.main` prints the message.
             raise typer.Exit(INTERRUPTED) from None
         except OSError as error:
-            # A reader that has gone, as of `dynresp ... | head`, is typer's to deal with.
+            # Output to a closed pipe, as with `dynresp ... | head`: typer handles it.
             if error.errno == errno.EPIPE:
                 raise
             typer.echo(f"dynresp: {error}", err=True)
             raise typer.Exit(DynrespError.exit_code) from None
         except MemoryError:
-            typer.echo("dynresp: not enough memory on this machine for that", err=True)
+            typer.echo(
+                "dynresp: this machine has not enough memory; try fewer hits or a shorter motion",
+                err=True,
+            )
             raise typer.Exit(DynrespError.exit_code) from None
 
 
@@ -48,8 +51,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         typer.echo(f"dynresp {__version__}")
         raise typer.Exit
 
@@ -58,10 +61,10 @@ def _version(asked: bool) -> None:
 def dynresp(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Show the version.", callback=_version, is_eager=True),
+        typer.Option("--version", help="Show the version.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Simulated people who take a hit and go on moving like people."""
+    """Hit a simulated person; dynresp computes how the person reacts and goes on moving."""
 
 
 app.command("run")(run.run)

@@ -1,4 +1,4 @@
-"""`dynresp bench`: how fast it is on this machine."""
+"""`dynresp bench`: how fast dynresp is on this machine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ app = typer.Typer(
 
 @app.command()
 def physics(seed: Seed = None, as_json: Json = False) -> None:
-    """Steps a second of simulated hits, against one thread of mujoco.rollout."""
+    """Measure simulation steps a second, beside mujoco.rollout on one thread."""
     typer.echo("stepping for about ten seconds ...", err=True)
     from dynresp.bench import physics_speed as bench
 
@@ -31,7 +31,7 @@ def physics(seed: Seed = None, as_json: Json = False) -> None:
 
 @app.command()
 def oracle(seed: Seed = None, as_json: Json = False) -> None:
-    """Search time a reaction, against vectorised NumPy and a readable twin."""
+    """Measure the full search (oracle), beside NumPy and plain Python."""
     typer.echo("searching for about five seconds ...", err=True)
     from dynresp.bench import full_search_speed as bench
 
@@ -40,7 +40,7 @@ def oracle(seed: Seed = None, as_json: Json = False) -> None:
 
 @app.command()
 def align(seed: Seed = None, as_json: Json = False) -> None:
-    """Time to align one reaction, and its error, against exhaustive alignment."""
+    """Measure how fast one reaction is aligned, beside trying all pairs."""
     typer.echo("simulating and aligning for about ten seconds ...", err=True)
     from dynresp.bench import alignment_speed as bench
 
@@ -54,13 +54,13 @@ def select(
         typer.Option(
             "--classifier",
             metavar="MODEL",
-            help="A classifier with its pipelines; by default a synthetic problem.",
+            help="A classifier with its scikit-learn models; by default an artificial one.",
         ),
     ] = None,
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
-    """Time to predict which reaction fits, against scikit-learn's own predict."""
+    """Measure how fast a classifier predicts, beside scikit-learn."""
     typer.echo("training and predicting for about ten seconds ...", err=True)
     from dynresp.bench import prediction_speed as bench
 
@@ -74,7 +74,7 @@ def respond(
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
-    """Time from a hit to a finished plan on one core, with every budget."""
+    """Measure the time from a hit to a planned response, for each budget."""
     typer.echo("throwing balls for about half a minute ...", err=True)
     from dynresp.bench import response_speed as bench
 
@@ -83,7 +83,7 @@ def respond(
 
 @app.command()
 def generate(motions: Motions = None, seed: Seed = None, as_json: Json = False) -> None:
-    """Labelled samples a second on one core, against a loop hit by hit."""
+    """Measure training samples a second, beside making them one by one."""
     typer.echo("labelling for about ten seconds ...", err=True)
     from dynresp.bench import generation_speed as bench
 
@@ -99,14 +99,14 @@ def graph(
             min=1000,
             max=1_000_000,
             metavar="N",
-            help="Also build a graph of N frames; may be repeated.",
+            help="Also build a graph of N frames; may be given several times.",
         ),
     ] = None,
     motions: Motions = None,
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
-    """Time to build a motion graph of 12,879 frames, beside vectorised NumPy."""
+    """Measure how fast a graph of 12,879 frames is built, beside NumPy."""
     typer.echo("building graphs for about half a minute ...", err=True)
     from dynresp.bench import graph_speed as bench
 

@@ -1,4 +1,4 @@
-"""`dynresp demo`: the shipped example."""
+"""`dynresp demo`: the example that comes with dynresp."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 from dynresp.cli.options import ChosenBudget, Json, Motions, Seed
-from dynresp.cli.run import answer, choice_of
+from dynresp.cli.run import choice_of, run_file
 
 EXAMPLE = "walk_ball.toml"
-"""The example that is shown, in the folder of examples."""
+"""The example, among `examples/specs/experiments`."""
 
 
 def demo(
@@ -23,12 +23,12 @@ def demo(
     budget: ChosenBudget = None,
     as_json: Json = False,
 ) -> None:
-    """Run the shipped example: a heavy ball, a walking person.
+    """Run an example: a heavy ball hits a walking person.
 
-    Needs no network: without motion capture on this machine it shows the built-in motions.
+    It needs no network: without motion capture on this machine it uses built-in motions.
     """
     from dynresp.support.paths import example_specs
 
-    answer(
+    run_file(
         example_specs("experiments") / EXAMPLE, out, motions, seed, as_json, choice_of(budget, None)
     )

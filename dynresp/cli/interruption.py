@@ -1,4 +1,4 @@
-"""SIGINT ends the program in order, wherever it comes, and with an exit code of its own."""
+"""Control-C (SIGINT) ends the program cleanly, with its own exit code."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import threading
 from types import FrameType
 
 INTERRUPTED = 130
-"""Exit code of an interrupted program, as shells have it: 128 and the number of the signal."""
+"""Exit code of an interrupted program, as in shells: 128 plus the number of the signal."""
 
 # An interruption that got lost is raised again after this time [s].
 _AGAIN_S = 0.05
 
 
 class Interrupted(KeyboardInterrupt):
-    """SIGINT came.
+    """SIGINT was received.
 
     Not `KeyboardInterrupt` itself: the interpreter remembers one that has left any `exec`, such as
-    a dataclass's in the midst of an import, and in the end kills itself by the signal, though the
+    a dataclass's during an import, and at its end kills itself by the signal, although the
     exception was caught.
     """
 
@@ -28,18 +28,18 @@ class Interruption:
     """Watches for SIGINT.
 
     Attributes:
-        came: Whether it came.
+        came: Whether it was received.
     """
 
     def __init__(self) -> None:
-        """Nothing has come yet."""
+        """Not received yet."""
         self.came = False
         self._watching = False
 
     def watch(self) -> None:
-        """Raise `Interrupted` in the main thread when SIGINT comes.
+        """Raise `Interrupted` in the main thread when SIGINT is received.
 
-        Where the signal is ignored or handled already, as under `nohup`, it stays so.
+        If the signal is ignored or handled already, as under `nohup`, it stays so.
         """
         if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
             return
@@ -57,7 +57,7 @@ class Interruption:
         raise Interrupted
 
     def _lost(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """What was raised where nothing can be: in a callback from C, or as an object goes."""
+        """Handle an exception from a place that cannot raise: a callback from C, or a `__del__`."""
         if unraisable.exc_type is not Interrupted:
             self._hook(unraisable)
             return
@@ -67,7 +67,7 @@ class Interruption:
 
 
 def _interrupt_main_thread() -> None:
-    """Send SIGINT to the main thread: unlike a note to the interpreter, it also ends a wait."""
+    """Send SIGINT to the main thread; unlike `_thread.interrupt_main`, it also ends a wait."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
     else:  # Windows

@@ -18,31 +18,31 @@ from dynresp.motion.retargeting.segments import find_segments
 from dynresp.support.runs import runs
 
 
-def facts(motion: Motion, file: Path | None, told: LoadOptions) -> dict[str, Any]:
+def motion_facts(motion: Motion, file: Path | None, options: LoadOptions) -> dict[str, Any]:
     """Facts about a motion.
 
     Args:
-        motion: As it is laid onto the character.
-        file: Where it comes from; None for a built-in motion.
-        told: What its reader was told.
+        motion: As retargeted to the character.
+        file: Its file; None for a built-in motion.
+        options: With which the file was read.
 
     Returns:
-        A dictionary that `json` can write. Lengths in metres; `file` is None where there is none
-        or where it is the product's own format.
+        A dictionary that `json` can write. Lengths in metres; `file` is None for a built-in motion
+        and for dynresp's own format.
     """
     character = default_character()
     states = character.kinematics(motion.poses)
     lowest = clearances(character, states).min(axis=0)
     feet = [character.body(f"{side}_foot") for side in FEET]
     root = motion.root_positions
-    way = float(np.linalg.norm(np.diff(root[:, :2], axis=0), axis=1).sum())
+    distance = float(np.linalg.norm(np.diff(root[:, :2], axis=0), axis=1).sum())
     return {
         "name": motion.name,
         "frames": len(motion),
         "fps": motion.fps,
         "duration_s": motion.duration,
-        "file": _file_facts(file, told),
-        "way_m": way,
+        "file": _file_facts(file, options),
+        "distance_m": distance,
         "pelvis_height_m": [float(root[:, 2].min()), float(root[:, 2].max())],
         "standing": [float(share) for share in motion.contacts.mean(axis=0)],
         "t_poses_s": _ranges(t_pose_frames(character, motion), motion.fps),
@@ -52,11 +52,13 @@ def facts(motion: Motion, file: Path | None, told: LoadOptions) -> dict[str, Any
     }
 
 
-def _file_facts(file: Path | None, told: LoadOptions) -> dict[str, Any] | None:
-    """What was found about a foreign file: joints, unit, up axis, and length of the legs."""
+def _file_facts(file: Path | None, options: LoadOptions) -> dict[str, Any] | None:
+    """Joints, unit, up axis and leg length of a file; None for dynresp's own format."""
     if file is None or file.suffix.lower() == ".npz":
         return None
-    found = read_motion_file(file, asf_path=told.asf, unit=told.unit, up=told.up, fps=told.fps)
+    found = read_motion_file(
+        file, asf_path=options.asf, unit=options.unit, up=options.up, fps=options.fps
+    )
     limb = find_segments(found).limbs["left"]
     rest = found.rest_positions()
     leg = sum(

@@ -1,4 +1,4 @@
-"""What a user can tell about a motion file, and how such a file is found and loaded."""
+"""Options of commands that read a motion file, and loading it by them."""
 
 from __future__ import annotations
 
@@ -23,31 +23,37 @@ class Axis(StrEnum):
 
 Unit: TypeAlias = Annotated[
     float | None,
-    typer.Option("--unit", min=1e-4, max=100.0, help="Metres per unit; found if not told."),
+    typer.Option(
+        "--unit", min=1e-4, max=100.0, help="Metres per unit of the file; by default detected."
+    ),
 ]
 Up: TypeAlias = Annotated[
-    Axis | None, typer.Option("--up", help="The axis that points up; found if not told.")
+    Axis | None, typer.Option("--up", help="Axis of the file that points up; by default detected.")
 ]
 Fps: TypeAlias = Annotated[
     float | None,
-    typer.Option("--fps", min=1.0, max=10_000.0, help="Frames a second, if the file lies."),
+    typer.Option(
+        "--fps", min=1.0, max=10_000.0, help="Frames a second, if the file states them wrong."
+    ),
 ]
 Asf: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--asf", metavar="FILE", help="Skeleton of an AMC file; found beside it."),
+    typer.Option(
+        "--asf", metavar="FILE", help="Skeleton of an AMC file; by default the one in its folder."
+    ),
 ]
 TrimTPose: TypeAlias = Annotated[
-    bool, typer.Option("--trim-t-pose", help="Cut T-poses off both ends.")
+    bool, typer.Option("--trim-t-pose", help="Cut off T-poses at the start and the end.")
 ]
 UnevenFloor: TypeAlias = Annotated[
     bool,
-    typer.Option("--uneven-floor", help="The person did not stand on level ground."),
+    typer.Option("--uneven-floor", help="The person did not walk on level ground."),
 ]
 Name: TypeAlias = Annotated[
     str,
     typer.Argument(
         metavar="MOTION",
-        help="A file, a path inside a motions folder, or builtin:walk and the like.",
+        help="A file, a path inside a motions folder, or a built-in motion such as builtin:walk.",
     ),
 ]
 
@@ -60,7 +66,7 @@ def options(
     trim_t_pose: bool,
     uneven_floor: bool,
 ) -> LoadOptions:
-    """What was told, for the loader."""
+    """The options as the loader takes them."""
     from dynresp.motion.load import LoadOptions
 
     return LoadOptions(
@@ -73,21 +79,21 @@ def options(
     )
 
 
-def load(name: str, motions: Path | None, told: LoadOptions) -> tuple[Motion, Path | None]:
+def load(name: str, motions: Path | None, options: LoadOptions) -> tuple[Motion, Path | None]:
     """Load a motion by its name.
 
     Args:
         name: A file, a path inside a motions folder, or a built-in motion.
-        motions: Motions folder that the user named.
-        told: What to tell the reader.
+        motions: Motions folder from the command line.
+        options: How to read the file.
 
     Returns:
         The motion, and its file; None for a built-in motion.
 
     Raises:
-        MissingMotionDataError: It is nowhere.
+        MissingMotionDataError: It is not on this machine.
         DynrespError: It cannot be read.
     """
     from dynresp.motion.named_motion import load_named_motion
 
-    return load_named_motion(name, motions, options=told)
+    return load_named_motion(name, motions, options=options)

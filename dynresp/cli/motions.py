@@ -1,4 +1,4 @@
-"""`dynresp motions`: what is there, what is in it, and how to get more."""
+"""`dynresp motions`: list, show, import, export and fetch motions."""
 
 from __future__ import annotations
 

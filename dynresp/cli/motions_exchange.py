@@ -1,4 +1,4 @@
-"""`dynresp motions import` and `export`: other people's files in, files for other programs out."""
+"""`dynresp motions import` and `export`: convert motion files."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Annotated
 
 import typer
 
-from dynresp.cli import motion_options as told
+from dynresp.cli import motion_options
 from dynresp.cli.options import Json, Motions
 
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")]
 
 
 class Format(StrEnum):
-    """A format that is written."""
+    """A format to write."""
 
     bvh = "bvh"
     npz = "npz"
@@ -27,20 +27,20 @@ def import_motions(
         list[Path], typer.Argument(metavar="FILE...", help="BVH, AMC, DeepMimic or .npz files.")
     ],
     out: Out,
-    unit: told.Unit = None,
-    up: told.Up = None,
-    fps: told.Fps = None,
-    asf: told.Asf = None,
-    trim_t_pose: told.TrimTPose = False,
-    uneven_floor: told.UnevenFloor = False,
+    unit: motion_options.Unit = None,
+    up: motion_options.Up = None,
+    fps: motion_options.Fps = None,
+    asf: motion_options.Asf = None,
+    trim_t_pose: motion_options.TrimTPose = False,
+    uneven_floor: motion_options.UnevenFloor = False,
     as_json: Json = False,
 ) -> None:
-    """Lay motion files onto the character, and write each as DIR/NAME.npz."""
+    """Retarget motion files to the character, and write each as DIR/NAME.npz."""
     from dynresp.motion.character import default_character
     from dynresp.motion.export import write_npz
     from dynresp.motion.load import load_motion
 
-    options = told.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
+    options = motion_options.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
     targets = _targets(files, out)
     rows = []
     for file, target in zip(files, targets, strict=True):
@@ -55,26 +55,26 @@ def import_motions(
 
 
 def export(
-    motion: told.Name,
+    motion: motion_options.Name,
     out: Out,
     file_format: Annotated[
         Format, typer.Option("--format", help="bvh opens in Blender, npz in NumPy.")
     ] = Format.bvh,
-    unit: told.Unit = None,
-    up: told.Up = None,
-    fps: told.Fps = None,
-    asf: told.Asf = None,
-    trim_t_pose: told.TrimTPose = False,
-    uneven_floor: told.UnevenFloor = False,
+    unit: motion_options.Unit = None,
+    up: motion_options.Up = None,
+    fps: motion_options.Fps = None,
+    asf: motion_options.Asf = None,
+    trim_t_pose: motion_options.TrimTPose = False,
+    uneven_floor: motion_options.UnevenFloor = False,
     motions: Motions = None,
     as_json: Json = False,
 ) -> None:
-    """Write a motion, as it is laid onto the character, for other programs."""
+    """Write a motion, as retargeted to the character, for other programs."""
     from dynresp.motion.character import default_character
     from dynresp.motion.export import write_bvh, write_npz
 
-    options = told.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
-    loaded, file = told.load(motion, motions, options)
+    options = motion_options.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
+    loaded, file = motion_options.load(motion, motions, options)
     stem = motion.partition(":")[2] if file is None else file.stem
     target = out / f"{stem}.{file_format.value}"
     write = write_bvh if file_format is Format.bvh else write_npz
@@ -87,10 +87,10 @@ def export(
 
 
 def _targets(files: list[Path], out: Path) -> list[Path]:
-    """Where each file goes.
+    """The file to write for each file.
 
     Raises:
-        UsageError: Two would go to the same place.
+        UsageError: Two would be written as the same file.
     """
     from dynresp.support.errors import UsageError
 

@@ -1,4 +1,4 @@
-"""`dynresp motions fetch`: public motion capture, at pinned commits, into the user's cache."""
+"""`dynresp motions fetch`: download public motion capture at pinned commits."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def fetch(
         str,
         typer.Argument(
             metavar="COLLECTION",
-            help="core: what core reactions and the examples use; full: the 147 reactions as well; "
-            "graphs: what the plans of `graph build` use; all: everything known.",
+            help="core: files for the core library and the examples; full: also for the full "
+            "library (147 reactions); graphs: for `graph build`; all: every file.",
         ),
     ],
     motions: Annotated[
@@ -33,9 +33,9 @@ def fetch(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Fetch public motion capture from where its makers publish it.
+    """Download public motion capture from its publishers.
 
-    Shows the licences, checks every file, and takes up an interrupted download where it was left.
+    Shows the licences, checks every file, and resumes an interrupted download.
     """
     from dynresp.motion.sources.fetch import FetchProgress, plan_fetch
     from dynresp.motion.sources.fetch import fetch as fetch_files
@@ -46,11 +46,11 @@ def fetch(
     plan = plan_fetch(collection, folder)
     for line in _licences(plan):
         typer.echo(line, err=True)
-    with progress() as tell:
+    with progress() as show:
 
         def report(state: FetchProgress) -> None:
             kib = state.total_received // 1024, max(1, state.total_bytes // 1024)
-            tell("fetching (KiB)", *kib)
+            show("fetching (KiB)", *kib)
 
         fetch_files(plan, progress=report)
     if as_json:
@@ -69,14 +69,14 @@ def fetch(
         )
     if folder is None and os.environ.get(MOTIONS_VARIABLE):
         typer.echo(
-            f"dynresp: {MOTIONS_VARIABLE} is set, so the fetched files are not looked at; unset it "
-            "to use them.",
+            f"dynresp: {MOTIONS_VARIABLE} is set, so dynresp does not look at the fetched files; "
+            "unset it to use them.",
             err=True,
         )
 
 
 def _licences(plan: FetchPlan) -> list[str]:
-    """What the files come under, and how much is to be fetched."""
+    """Licences of the files, and how much is to be downloaded."""
     lines = []
     for licence in plan.licences:
         lines += [

@@ -12,7 +12,7 @@ from dynresp.cli.options import Json, Motions
 def list_motions(motions: Motions = None, as_json: Json = False) -> None:
     """List the built-in motions and the motion files on this machine.
 
-    The names are what experiments, `show` and `export` take.
+    Use these names in experiment files and with `motions show` and `motions export`.
     """
     from dynresp.motion.builtin import builtin_info, builtin_names
     from dynresp.motion.named_motion import BUILTIN_PREFIX
@@ -53,7 +53,7 @@ def list_motions(motions: Motions = None, as_json: Json = False) -> None:
     typer.echo(
         f"{len(builtins)} built-in motions, {len(files)} files in {where}"
         if folders
-        else f"{len(builtins)} built-in motions; no folder of motion files is named and none was "
-        "fetched (`dynresp motions fetch core`)",
+        else f"{len(builtins)} built-in motions; no motions folder is set, and nothing was fetched "
+        "(`dynresp motions fetch core` fetches some)",
         err=True,
     )

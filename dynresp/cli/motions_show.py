@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynresp.cli import motion_options as told
+from dynresp.cli import motion_options
 from dynresp.cli.options import Json, Motions
 
 if TYPE_CHECKING:
@@ -16,30 +16,30 @@ if TYPE_CHECKING:
 
 
 def show(
-    motion: told.Name,
+    motion: motion_options.Name,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder for recording.html and filmstrip.png."),
     ] = None,
-    unit: told.Unit = None,
-    up: told.Up = None,
-    fps: told.Fps = None,
-    asf: told.Asf = None,
-    trim_t_pose: told.TrimTPose = False,
-    uneven_floor: told.UnevenFloor = False,
+    unit: motion_options.Unit = None,
+    up: motion_options.Up = None,
+    fps: motion_options.Fps = None,
+    asf: motion_options.Asf = None,
+    trim_t_pose: motion_options.TrimTPose = False,
+    uneven_floor: motion_options.UnevenFloor = False,
     motions: Motions = None,
     as_json: Json = False,
 ) -> None:
-    """Show what is in a motion, as it is laid onto the character.
+    """Show facts about a motion, as retargeted to the character.
 
-    Frames, length, what was found about the file, way, foot contacts, T-poses, and how well it
-    stands on the floor; with --out also a 3D recording and a filmstrip.
+    Frames, duration, the file's skeleton and units, distance walked, foot contacts, T-poses, and
+    heights over the floor. With --out also a 3D recording and a filmstrip.
     """
-    from dynresp.cli.motion_facts import facts
+    from dynresp.cli.motion_facts import motion_facts
 
-    options = told.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
-    loaded, file = told.load(motion, motions, options)
-    found = facts(loaded, file, options)
+    options = motion_options.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
+    loaded, file = motion_options.load(motion, motions, options)
+    found = motion_facts(loaded, file, options)
     if out is not None:
         _draw(loaded, out)
     if as_json:
@@ -53,7 +53,7 @@ def _draw(motion: Motion, out: Path) -> None:
     from dynresp.view.recording import write_recording
     from dynresp.view.story import Story, StoryPhase
 
-    # Two thirds of the files come at 120 frames a second, which no screen shows.
+    # Most files have 120 frames a second, more than a screen shows.
     shown = motion.resampled(30.0) if motion.fps > 30.0 else motion
     story = Story(
         shown,
@@ -69,7 +69,7 @@ def _draw(motion: Motion, out: Path) -> None:
 def _lines(found: dict[str, Any]) -> list[str]:
     ranges = ", ".join(f"{start:.2f} to {stop:.2f} s" for start, stop in found["t_poses_s"])
     frames = f"{found['frames']} frames at {found['fps']:g} fps"
-    lines = [f"  length     {found['duration_s']:.2f} s, {frames}"]
+    lines = [f"  duration   {found['duration_s']:.2f} s, {frames}"]
     if found["file"] is not None:
         file = found["file"]
         lines.append(
@@ -80,10 +80,10 @@ def _lines(found: dict[str, Any]) -> list[str]:
     left, right = found["standing"]
     return [
         *lines,
-        f"  way        {found['way_m']:.2f} m over the ground, "
+        f"  distance   {found['distance_m']:.2f} m over the ground, "
         f"pelvis {low:.2f} to {high:.2f} m high",
         f"  contacts   left foot stands {left:.0%} of the time, right {right:.0%}",
         f"  T-poses    {ranges or 'none'}",
-        f"  floor      lowest point of the feet {100 * found['lowest_foot_m']:.1f} cm, of the rest "
-        f"{100 * found['lowest_body_m']:.1f} cm",
+        f"  floor      lowest point of the feet at {100 * found['lowest_foot_m']:.1f} cm, "
+        f"of other bodies {100 * found['lowest_body_m']:.1f} cm",
     ]

@@ -13,12 +13,17 @@ Motions: TypeAlias = Annotated[
     typer.Option(
         "--motions",
         metavar="DIR",
-        help="Folder of motion files; by default DYNRESP_MOTIONS, else what was fetched.",
+        help="Folder of motion files; by default DYNRESP_MOTIONS, else the fetched files.",
     ),
 ]
 Seed: TypeAlias = Annotated[
     int | None,
-    typer.Option("--seed", min=0, max=2**63 - 1, help="Seed of all that is random."),
+    typer.Option(
+        "--seed",
+        min=0,
+        max=2**63 - 1,
+        help="Seed of all random values: the same seed gives the same result.",
+    ),
 ]
 Json: TypeAlias = Annotated[
     bool,
@@ -27,7 +32,7 @@ Json: TypeAlias = Annotated[
 
 
 class Budget(StrEnum):
-    """How much is spent on choosing a reaction."""
+    """How much time the choice of a reaction may take."""
 
     fast = "fast"
     better = "better"
@@ -38,8 +43,8 @@ ChosenBudget: TypeAlias = Annotated[
     Budget | None,
     typer.Option(
         "--budget",
-        help="fast: the classifier's first choice (the default); better: the better one of its "
-        "two best; best: the oracle searches all reactions.",
+        help="How to choose the reaction. fast: the classifier's first choice (default); better: "
+        "the better of its two best; best: full search (oracle), which compares all reactions.",
     ),
 ]
 ChosenClassifier: TypeAlias = Annotated[
@@ -47,7 +52,7 @@ ChosenClassifier: TypeAlias = Annotated[
     typer.Option(
         "--classifier",
         metavar="MODEL",
-        help="A classifier that `dynresp train` has written; by default the one kept for the "
-        "library.",
+        help="A classifier file from `dynresp train`; by default the one trained or shipped for "
+        "the library.",
     ),
 ]

@@ -13,25 +13,25 @@ from dynresp.support.progress import Progress
 
 @contextmanager
 def progress() -> Iterator[Progress]:
-    """What to tell progress to, while the block runs."""
+    """What shows progress while the block runs."""
     if sys.stderr.isatty():
-        with _bar() as tell:
-            yield tell
+        with _bar() as report:
+            yield report
     else:
         yield _lines()
 
 
 def _lines() -> Progress:
-    """A line whenever another stage begins."""
+    """A line when a stage begins."""
     last = ""
 
-    def tell(stage: str, done: int, of: int) -> None:
+    def report(stage: str, done: int, of: int) -> None:
         nonlocal last
         if stage != last:
             typer.echo(f"{stage} ...", err=True)
             last = stage
 
-    return tell
+    return report
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def _bar() -> Iterator[Progress]:
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task("starting", total=None)
 
-        def tell(stage: str, done: int, of: int) -> None:
+        def report(stage: str, done: int, of: int) -> None:
             bars.update(task, description=stage, completed=done, total=max(of, 1))
 
-        yield tell
+        yield report

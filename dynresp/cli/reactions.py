@@ -1,4 +1,4 @@
-"""`dynresp reactions`: what a hit person can go on with."""
+"""`dynresp reactions`: the reactions of a library."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 from dynresp.cli.options import Json, Motions
 
 app = typer.Typer(
-    help="Recorded reactions that a hit can be answered with.",
+    help="Reactions that can follow a hit.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -19,7 +19,7 @@ app = typer.Typer(
 
 @app.callback()
 def reactions() -> None:
-    """Recorded reactions that a hit can be answered with."""
+    """Reactions that can follow a hit."""
 
 
 @app.command("list")
@@ -31,16 +31,16 @@ def list_reactions(
     motions: Motions = None,
     as_json: Json = False,
 ) -> None:
-    """List the reactions of a library: name, strategy, length and source.
+    """List the reactions of a library: name, strategy, duration and source.
 
-    Without its motion capture on this machine, core is the built-in library.
+    If the motion capture of core is not on this machine, the built-in library takes its place.
     """
     from dynresp.motion.character import default_character
     from dynresp.motion.reactions.named_library import library_record, load_named_library
     from dynresp.motion.sources.motion_folders import motion_folders
 
     found = load_named_library(library, motion_folders(motions), Path(), 30.0, default_character())
-    about = library_record(found, library)
+    record = library_record(found, library)
     if as_json:
         rows = [
             {
@@ -53,9 +53,9 @@ def list_reactions(
             }
             for reaction in found.reactions
         ]
-        typer.echo(json.dumps({"library": about, "reactions": rows}, indent=2))
+        typer.echo(json.dumps({"library": record, "reactions": rows}, indent=2))
         return
-    if "instead_of" in about:
+    if "instead_of" in record:
         typer.echo(
             "dynresp: the motion capture of 'core' is not on this machine; these are the built-in "
             "reactions. `dynresp motions fetch core` gets it.",

@@ -1,4 +1,4 @@
-"""`dynresp run`: from an experiment file to a folder of results."""
+"""`dynresp run`: runs an experiment file and writes its result folder."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ def run(
     classifier: ChosenClassifier = None,
     as_json: Json = False,
 ) -> None:
-    """Run an experiment: hit the character, and write how it goes on.
+    """Run an experiment file: hit the character, and write how it reacts.
 
-    Writes result.json, motion.npz, motion.bvh, recording.html, filmstrip.png, alignment.png and,
-    where the machine can render, video.mp4; of a batch summary.json, table.csv and the same files
+    One hit: result.json, motion.npz, motion.bvh, recording.html, filmstrip.png, alignment.png and,
+    if this machine can render, video.mp4. Several hits: summary.json, table.csv, and those files
     for some of the hits.
     """
-    answer(experiment, out, motions, seed, as_json, choice_of(budget, classifier))
+    run_file(experiment, out, motions, seed, as_json, choice_of(budget, classifier))
 
 
 def choice_of(budget: Budget | None, classifier: Path | None) -> dict[str, str]:
-    """What the command line says of `[choice]`."""
-    said = {} if budget is None else {"budget": budget.value}
-    return said if classifier is None else {**said, "classifier": str(classifier.absolute())}
+    """Keys of `[choice]` that the command line gives."""
+    choice = {} if budget is None else {"budget": budget.value}
+    return choice if classifier is None else {**choice, "classifier": str(classifier.absolute())}
 
 
-def answer(
+def run_file(
     experiment: Path,
     out: Path,
     motions: Path | None,
@@ -47,19 +47,19 @@ def answer(
     as_json: bool,
     choice: dict[str, str],
 ) -> None:
-    """Run an experiment file and print what came of it.
+    """Run an experiment file and print its results.
 
     Args:
         experiment: The file.
         out: Folder for the results.
-        motions: Motions folder that the user named.
+        motions: Motions folder from the command line.
         seed: Used instead of the file's own.
         as_json: Print `result.json` or `summary.json` instead of text.
-        choice: Keys of `[choice]` that are taken instead of the file's own.
+        choice: Keys of `[choice]` that replace the file's own.
 
     Raises:
-        typer.Exit: With code 1, where every simulation diverged, or a file could not be written;
-            a video on a machine that cannot draw is none.
+        typer.Exit: With code 1, if every simulation diverged or a file could not be written. A
+            video that this machine cannot render does not count.
         DynrespError: It could not be done.
     """
     from dynresp.cli.result_text import choice_text, result_text, substitutes_text, summary_text
@@ -68,12 +68,12 @@ def answer(
 
     file = read_experiment(experiment)
     check_folder(out)
-    with progress() as tell:
-        tell("loading motions", 0, 1)
+    with progress() as report:
+        report("loading motions", 0, 1)
         from dynresp.experiments.runner import prepare_run, run_experiment
 
         loaded = prepare_run(file, experiment.parent, motions, seed, choice=choice)
-        content = run_experiment(loaded, out, tell)
+        content = run_experiment(loaded, out, report)
     for remark in (substitutes_text(content), choice_text(content)):
         if remark:
             typer.echo(f"dynresp: {remark}", err=True)
@@ -85,16 +85,19 @@ def answer(
     else:
         typer.echo(result_text(content, out))
     if _all_diverged(content):
-        typer.echo("dynresp: the simulation diverged; see result.json", err=True)
+        typer.echo(
+            "dynresp: every simulation diverged; try a lighter or slower hit",
+            err=True,
+        )
         raise typer.Exit(1)
     exit_if_failed(content["files"])
 
 
 def report_unwritten(files: Mapping[str, str]) -> None:
-    """Say which files were not written; the same reason is said once.
+    """Print which files were not written; the same reason is printed once.
 
     Args:
-        files: What `result_folder.attempt` says of each file.
+        files: For each file, what `result_folder.attempt` returned.
     """
     from dynresp.results.result_folder import WRITTEN
 
@@ -107,13 +110,13 @@ def report_unwritten(files: Mapping[str, str]) -> None:
 
 
 def exit_if_failed(files: Mapping[str, str]) -> None:
-    """Exit with code 1 where a file failed; one that this machine cannot make has not.
+    """Exit with code 1 if a file failed. One that this machine cannot make did not fail.
 
     Args:
-        files: What `result_folder.attempt` says of each file.
+        files: For each file, what `result_folder.attempt` returned.
 
     Raises:
-        typer.Exit: With code 1, where one failed.
+        typer.Exit: With code 1, if one failed.
     """
     from dynresp.results.result_folder import is_failure
 
@@ -122,22 +125,22 @@ def exit_if_failed(files: Mapping[str, str]) -> None:
 
 
 def check_folder(out: Path) -> None:
-    """Refuse, before any work, to write where nothing can be written."""
+    """Check, before any work, that results can be written to a folder."""
     from dynresp.support.errors import UsageError
 
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out: {str(out)!r} is a file; expected a folder for the results")
-    # The nearest folder that is there: the rest is made when there is something to write.
+    # The nearest folder that exists; the others are made later.
     above = next(folder for folder in [out, *out.absolute().parents] if folder.exists())
     if not above.is_dir() or not os.access(above, os.W_OK):
         raise UsageError(
-            f"--out: {str(out)!r} cannot be written, because of {str(above)!r}; choose another "
-            "folder"
+            f"--out: {str(out)!r} cannot be made, because {str(above)!r} is not a folder that can "
+            "be written; choose another folder"
         )
 
 
 def check_file(out: Path) -> None:
-    """Refuse, before any work, to write a file where none can be written."""
+    """Check, before any work, that a file can be written."""
     from dynresp.support.errors import UsageError
 
     if not out.name or out.is_dir():

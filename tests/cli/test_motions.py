@@ -17,7 +17,7 @@ def test_show_tells_facts(world: Path, dynresp: Command) -> None:
     assert facts["duration_s"] == 4.0
     assert facts["file"] is None
     assert facts["t_poses_s"] == []
-    assert facts["way_m"] == pytest.approx(0.0, abs=1e-9)
+    assert facts["distance_m"] == pytest.approx(0.0, abs=1e-9)
     text = dynresp("motions", "show", "stand.npz", "--motions", world).stdout
     assert "4.00 s, 121 frames at 30 fps" in text
 
