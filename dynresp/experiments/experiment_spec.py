@@ -1,4 +1,4 @@
-"""What an experiment file may say. `docs/experiments.md` explains it to those who write one.
+"""The tables of an experiment file; `docs/experiments.md` explains them to users.
 
 Units stand in the names of the keys. Times count from the start of the base motion as it is cut.
 """

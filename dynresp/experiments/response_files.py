@@ -40,8 +40,8 @@ def write_response(
 ) -> dict[str, Any]:
     """Write one response to a folder.
 
-    What an earlier run left there under these names, and this one does not write, is removed, so
-    that all files in the folder belong together.
+    Files of an earlier run that this one does not write are removed, so that all files in the
+    folder belong together.
 
     Args:
         folder: Where to; made if it is missing.
@@ -98,7 +98,7 @@ def _write_alignment(path: Path, response: Response, title: str, responder: Resp
         response.entry / fps,
         title=f"{title}: {reaction_title(response.choice)}",
         unit="m",
-        # One reaction beside the base motion is no ranking.
+        # One reaction and the base motion do not make a ranking.
         ranking=ranking if len(ranking) > 2 else [],
         chosen_name=response.choice,
     )
@@ -124,7 +124,7 @@ def _subtitle(hit: Hit, response: Response) -> str:
 
 
 def _has_built_in(hit: Hit, response: Response) -> bool:
-    """Whether any motion shown was made by this project, and is no motion capture."""
+    """Whether any motion shown is a built-in motion."""
     names = [response.motion.name]
     if response.entered is not None:
         names.append(response.entered.name)

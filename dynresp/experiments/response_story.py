@@ -14,10 +14,10 @@ from dynresp.physics.impacts import GRAVITY, Impact, PreparedImpact, Strike
 from dynresp.response.response import CARRY_ON, Response
 from dynresp.view.story import MovingSphere, Story, StoryEvent, StoryPhase
 
-# A ball is seen coming for this long before its flight is simulated, a fist for less [s].
+# How long before its simulated flight a ball is shown, and a fist [s].
 _BALL_SEEN_S = 1.3
 _FIST_SEEN_S = 0.1
-# After the simulation a ball rolls out: its speed falls to 1/e in this time [s].
+# After the simulation a ball rolls to a stop: its speed falls to 1/e in this time [s].
 _ROLL_S = 0.7
 
 

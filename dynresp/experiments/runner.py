@@ -1,4 +1,4 @@
-"""Running an experiment from its file to its folder."""
+"""Running an experiment: loading what it needs, all its hits, and the result folder."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ from dynresp.results.result_json import versions, write_json
 from dynresp.support.errors import MotionError, SpecError
 from dynresp.support.progress import Progress, no_progress
 
-# Hits are answered in bundles of this size, so that memory does not grow with their number.
-_BUNDLE = 100
+# Hits are simulated in groups of this size, so that memory does not grow with their number.
+_GROUP = 100
 
 
 @dataclass(frozen=True)
@@ -52,16 +52,16 @@ class HitResult:
 
 @dataclass(frozen=True)
 class Run:
-    """An experiment with all that it needs, loaded.
+    """An experiment with everything it needs, loaded.
 
     Attributes:
-        experiment: The file.
+        experiment: Content of the file.
         seed: Seed of its random values.
         character: The character.
         base: The base motion.
         striker: The second character's motion, of a strike.
         library: The reactions.
-        choosing: What chooses among them.
+        choosing: What chooses among them, and its record.
         config: Settings.
         threads: Threads for the physics, 0 for all cores.
     """
@@ -94,15 +94,20 @@ class Run:
         return draw_hits(table, self.seed, numbers, self.striker.motion, cut.hit_s, cut.side)
 
     def results(self, numbers: range, progress: Progress) -> Iterator[HitResult]:
-        """HitResult hits, bundle by bundle."""
-        for start in range(numbers.start, numbers.stop, _BUNDLE):
-            hits = self.hits(range(start, min(start + _BUNDLE, numbers.stop)))
+        """Responses to hits, one after the other.
 
-            def tell(stage: str, done: int, of: int, start: int = start) -> None:
+        Args:
+            numbers: Which hits.
+            progress: Called with the stage, how many hits are done, and of how many.
+        """
+        for start in range(numbers.start, numbers.stop, _GROUP):
+            hits = self.hits(range(start, min(start + _GROUP, numbers.stop)))
+
+            def report(stage: str, done: int, of: int, start: int = start) -> None:
                 progress(stage, start - numbers.start + done, len(numbers))
 
             responses = self.responder.respond(
-                [(self.base.motion, hit.impact) for hit in hits], tell
+                [(self.base.motion, hit.impact) for hit in hits], report
             )
             for hit, response in zip(hits, responses, strict=True):
                 yield HitResult(hit, response, measure(response, self.character))
@@ -136,15 +141,15 @@ def prepare_run(
     threads: int = 0,
     choice: Mapping[str, str] | None = None,
 ) -> Run:
-    """Load all that an experiment needs.
+    """Load everything that an experiment needs.
 
     Args:
-        experiment: The file.
-        beside: Its folder, from which relative paths count.
-        motions: Motions folder that the user named.
+        experiment: Content of the file.
+        beside: Its folder; relative paths count from it.
+        motions: Motions folder in place of `DYNRESP_MOTIONS` and of what was fetched.
         seed: Used instead of the file's own.
         threads: Threads for the physics, 0 for all cores.
-        choice: Keys of `[choice]` that are taken instead of the file's own.
+        choice: Keys of `[choice]` that replace the file's own.
 
     Raises:
         MissingMotionDataError: A motion is not on this machine.
@@ -185,10 +190,14 @@ def prepare_run(
 
 
 def _check_times(run: Run) -> None:
-    """Refuse hits before or after the base motion, before anything is simulated."""
+    """Check, before anything is simulated, that all hits come during the base motion.
+
+    Raises:
+        SpecError: One does not.
+    """
     hits = run.hits(range(run.experiment.experiment.count))
     if not isinstance(hits[0].impact, Ball):
-        # What is no ball needs as long before in all hits, so the earliest and the latest will do.
+        # Other impacts need the same lead in all hits, so checking the first and last is enough.
         hits = [min(hits, key=_time), max(hits, key=_time)]
     for hit in hits:
         try:
@@ -205,7 +214,7 @@ def _time(hit: Hit) -> float:
 
 
 def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dict[str, Any]:
-    """HitResult all hits of an experiment and write the result folder.
+    """Simulate all hits of an experiment and write the result folder.
 
     Args:
         run: The experiment, loaded.
@@ -228,12 +237,12 @@ def write_results(
 ) -> dict[str, Any]:
     """Write the result folder of an experiment.
 
-    What an earlier run left in the folder is removed, so that all of dynresp's files there belong
+    Files of an earlier run are removed, so that all of dynresp's files in the folder belong
     together.
 
     Args:
         run: The experiment, loaded.
-        results: All its results, in order. Those that are not written in full are not kept.
+        results: Of all its hits, in order. Those that are not written in full are not kept.
         out: Folder to write to; made if it is missing.
         progress: Called with the stage, how many are done, and of how many.
 

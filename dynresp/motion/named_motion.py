@@ -34,7 +34,7 @@ class NamedMotion:
     Attributes:
         motion: Cut, mirrored and at the wanted frame rate.
         record: Where it comes from, for `result.json`.
-        cut: The table that named it: of two, the one that could be had.
+        cut: The table that names it; if a table names two, the one that was used.
     """
 
     motion: Motion
@@ -55,8 +55,8 @@ def load_spec_motion(
 
     Args:
         cut: The table.
-        otherwise: What to take where no motions folder holds that file.
-        key: Where the table stands in the file, for messages.
+        otherwise: The table under `or`, used if no motions folder holds the first file.
+        key: Place of the table in the file, for messages.
         folders: Motions folders.
         beside: Folder of the experiment file, from which relative paths count first.
         fps: Frame rate to bring it to [1/s].
@@ -69,8 +69,8 @@ def load_spec_motion(
     """
     found = find_motion(cut.motion, folders, beside)
     if found is None and otherwise is not None:
-        taken = load_spec_motion(otherwise, None, f"{key}.or", folders, beside, fps, character)
-        return replace(taken, record={**taken.record, "instead_of": cut.motion})
+        other = load_spec_motion(otherwise, None, f"{key}.or", folders, beside, fps, character)
+        return replace(other, record={**other.record, "instead_of": cut.motion})
     if found is None:
         looked = ", ".join(str(folder) for folder in [beside, *folders])
         raise MissingMotionDataError(
@@ -150,7 +150,7 @@ def load_cut(cut: MotionCut, found: Path | str, key: str, character: Character) 
     Args:
         cut: The table.
         found: What `find_motion` found.
-        key: Where the table stands in the file, for messages.
+        key: Place of the table in the file, for messages.
         character: The character.
 
     Returns:

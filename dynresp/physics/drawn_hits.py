@@ -1,4 +1,4 @@
-"""From the table of an impact to hits: random values drawn, units taken off the names."""
+"""Drawing hits from an `[[impact]]` table: random values, and the impact for the simulation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which classifier an experiment chooses with, and what it does for want of one."""
+"""`[choice]`: the budget and the classifier, and the chooser made of them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHIPPED = (BUILTIN, *RECORDED)
 
 
 class ChoiceTable(Strict):
-    """`[choice]`: how much is spent on choosing, and with which classifier."""
+    """`[choice]`: how much time a choice may take, and with which classifier."""
 
     budget: Budget = "fast"
     classifier: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
@@ -33,11 +33,11 @@ class ChoiceTable(Strict):
 
 @dataclass(frozen=True)
 class NamedChooser:
-    """What chooses in an experiment.
+    """A chooser and where it comes from.
 
     Attributes:
-        chooser: It.
-        record: What `result.json` says of it.
+        chooser: The chooser.
+        record: What `result.json` says of it under `choosing`.
     """
 
     chooser: Chooser
@@ -51,27 +51,27 @@ def make_chooser(
     config: ResponseConfig,
     beside: Path,
 ) -> NamedChooser:
-    """Make what an experiment asks for.
+    """Make the chooser of a spec.
 
-    For want of a classifier for the library, the oracle chooses.
+    Without a classifier for the library it is the full search (oracle).
 
     Args:
         table: The experiment's `[choice]`.
         character: The character.
         library: Its reactions.
-        config: Settings.
-        beside: Folder of the experiment file, from which a relative path counts.
+        config: Settings of the responses.
+        beside: Folder of the spec file; a relative path counts from it.
 
     Raises:
-        SpecError: A classifier is named, but the oracle is to choose.
+        SpecError: A classifier is given with the budget "best".
         ClassifierError: A classifier's file is damaged, or it was trained for something else.
         MotionError: A clip of the library is shorter than a window.
     """
     budget = table.budget
     if budget == "best" and table.classifier is not None:
         raise SpecError(
-            'choice: with the budget "best" the oracle chooses, and no classifier; leave out '
-            "classifier, or take another budget"
+            'choice: the budget "best" makes a full search and uses no classifier; leave out '
+            "classifier, or set another budget"
         )
     record: dict[str, Any] = {"budget": budget}
     classifier = None
@@ -82,7 +82,7 @@ def make_chooser(
         except ClassifierError as error:
             if named is not None:
                 raise
-            # Nobody named the file that was kept; what is shipped is as it should be.
+            # The user's own classifier is damaged or outdated; use the shipped one.
             record["passed_over"] = str(error)
             classifier = _shipped(library, character)
         if classifier is None:
@@ -96,15 +96,15 @@ def make_chooser(
 def find_classifier(
     library: ReactionLibrary, character: Character, named: Path | None = None
 ) -> Classifier | None:
-    """The classifier for a library: a named one, this user's own, or the one that is shipped.
+    """The classifier for a library: the one given, else the user's own, else the shipped one.
 
     Args:
         library: The reactions.
         character: Their character.
-        named: File that the user named.
+        named: A classifier file.
 
     Returns:
-        None where none is named and there is none.
+        None if there is none.
 
     Raises:
         ClassifierError: The file is damaged, or was trained for something else.
@@ -121,7 +121,7 @@ def _shipped(library: ReactionLibrary, character: Character) -> Classifier | Non
     if library.name not in SHIPPED:
         return None
     shipped = load_classifier(shipped_classifier(library.name))
-    # Another library may bear the name of one of ours.
+    # A user's library may have the name of a shipped one.
     return shipped if shipped.trained_for == TrainedFor.of(library, character) else None
 
 
@@ -135,12 +135,12 @@ def shipped_classifier(library: str) -> Path:
 
 
 def _classifier_record(classifier: Classifier, config: ResponseConfig) -> dict[str, Any]:
-    told: dict[str, Any] = {
+    record: dict[str, Any] = {
         "classes": len(classifier.classes),
         "features": len(classifier.feature_names),
         "trained_on": classifier.trained_on.samples,
         "dataset": classifier.trained_on.dataset,
     }
-    # Trained with other settings it predicts what the oracle would have chosen with those.
+    # A classifier predicts what the full search chooses with the settings of its training.
     differing = classifier.differing_settings(settings_record(config))
-    return {**told, "other_settings": differing} if differing else told
+    return {**record, "other_settings": differing} if differing else record

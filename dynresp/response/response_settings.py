@@ -1,4 +1,4 @@
-"""From `[settings]` of an experiment file to the settings of physics, search and blend."""
+"""`[settings]`: settings of physics, search and blend, and what `result.json` says of them."""
 
 from __future__ import annotations
 
@@ -68,15 +68,15 @@ def response_config(settings: SettingsTable) -> ResponseConfig:
 def settings_record(config: ResponseConfig) -> dict[str, Any]:
     """What `result.json` says of the settings: every key of `[settings]`, given or not.
 
-    Under `fixed` stands what an experiment file cannot set.
+    `fixed` holds what an experiment file cannot set.
     """
-    told = {}
+    record = {}
     for key, (part, name) in _PLACES.items():
-        told[key] = getattr(getattr(config, part) if part else config, name)
+        record[key] = getattr(getattr(config, part) if part else config, name)
     servo = {item.name: getattr(config.physics.servo, item.name)
              for item in fields(config.physics.servo)}  # fmt: skip
     return {
-        **told,
+        **record,
         "fixed": {
             "fps": config.physics.fps,
             "carry_on_exit_s": config.carry_on_exit_s,

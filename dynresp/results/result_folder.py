@@ -1,4 +1,4 @@
-"""The folder of an experiment: what is called how, what is written, and what is left from before.
+"""The result folder: names of its files, writing them, and removing those of earlier runs.
 
 Only files that dynresp writes itself are ever removed.
 """
@@ -24,12 +24,12 @@ Artefact = Literal[
 """What can be written for each response, besides `result.json`."""
 
 PLAN, OPTIONS, WATCHING = "plan.png", "options.png", "watching.png"
-"""Pictures of a way through a motion graph, of the actions offered, of the video followed."""
+"""Pictures of a path on the ground, of the actions offered, and of the video followed."""
 RESULT, SUMMARY, TABLE = "result.json", "summary.json", "table.csv"
 
 WRITTEN = "written"
-"""What `files` says of a file that is there."""
-_NOT_TO_BE_HAD = "not written: "
+"""What `files` in `result.json` says of a written file."""
+_NOT_WRITTEN = "not written: "
 _FAILED = "failed: "
 
 _ARTEFACTS: tuple[str, ...] = get_args(Artefact)
@@ -38,7 +38,7 @@ _HIT = re.compile(r"hit_\d{5,}")
 
 
 class NothingToShowError(DynrespError):
-    """There is nothing that this file could show; the message says why."""
+    """A file would have nothing to show; the message says why."""
 
 
 def hit_folder(number: int) -> str:
@@ -47,45 +47,45 @@ def hit_folder(number: int) -> str:
 
 
 def is_failure(what: str) -> bool:
-    """Whether `files` says of a file that it should be there and could not be written."""
+    """Whether `files` says that a file could not be written."""
     return what.startswith(_FAILED)
 
 
 def attempt(write: Callable[[Path], None], path: Path) -> str:
-    """Write a file, whatever may go wrong.
+    """Write a file; an error becomes its text, and is not raised.
 
     Args:
-        write: Writes it to the path it is given.
+        write: Writes it to a path.
         path: The file.
 
     Returns:
-        What `files` in `result.json` says: `WRITTEN`; or why there is none for this response, on
-        a machine that cannot draw or without an optional package; or why it failed.
+        What `files` in `result.json` says: `WRITTEN`; why there is none for this response, on a
+        machine that cannot draw, or without an optional package; or why it failed.
     """
     from dynresp.view.video_writer import RenderingUnavailableError
 
     try:
         write(path)
     except (RenderingUnavailableError, MissingExtraError, NothingToShowError) as error:
-        return f"{_NOT_TO_BE_HAD}{error}"
-    # One picture that fails, for whatever reason, must not cost the others and the figures.
+        return f"{_NOT_WRITTEN}{error}"
+    # If one picture fails, the others and the numbers are still written.
     except Exception as error:
-        return f"{_FAILED}{error if isinstance(error, DynrespError) else _named(error)}"
+        return f"{_FAILED}{error if isinstance(error, DynrespError) else _in_a_line(error)}"
     return WRITTEN
 
 
-def _named(error: Exception) -> str:
-    """An error that is none of the product's, in a line."""
+def _in_a_line(error: Exception) -> str:
+    """An unexpected exception in a line."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text[:300]}" if text else type(error).__name__
 
 
 def clear_response(folder: Path, written: Collection[str]) -> dict[str, str]:
-    """Remove what earlier runs left in the folder of a response.
+    """Remove files of earlier runs from the folder of a response.
 
     Args:
         folder: The folder.
-        written: Names of the files that are of this run, and stay.
+        written: Names of this run's files, which stay.
 
     Returns:
         For each file that could not be removed, what `files` says of it.
@@ -95,7 +95,7 @@ def clear_response(folder: Path, written: Collection[str]) -> dict[str, str]:
 
 
 def clear_batch(folder: Path, shown: Collection[int]) -> dict[str, str]:
-    """Remove what earlier runs left in the folder of a batch.
+    """Remove files of earlier runs from the folder of a batch.
 
     Args:
         folder: The folder.
@@ -108,7 +108,7 @@ def clear_batch(folder: Path, shown: Collection[int]) -> dict[str, str]:
 
 
 def _remove_hits(out: Path, shown: Collection[int]) -> dict[str, str]:
-    """Remove the hits of a batch that are not shown."""
+    """Remove the folders of hits that are not shown."""
     ours = {hit_folder(number) for number in shown}
     try:
         entries = sorted(out.iterdir())
@@ -121,7 +121,7 @@ def _remove_hits(out: Path, shown: Collection[int]) -> dict[str, str]:
             continue
         kept = _remove(entry, _OF_A_RESPONSE)
         failed |= {f"{entry.name}/{name}": what for name, what in kept.items()}
-        # Where somebody has put something of his own, it stays.
+        # A folder with files of the user stays.
         with suppress(OSError):
             entry.rmdir()
     return failed
@@ -131,7 +131,7 @@ def _remove(folder: Path, names: Collection[str]) -> dict[str, str]:
     failed = {}
     for name in names:
         path = folder / name
-        # A folder of that name is not ours.
+        # dynresp makes no folder of that name.
         if path.is_dir() and not path.is_symlink():
             continue
         try:

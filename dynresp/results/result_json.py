@@ -18,7 +18,7 @@ _DIGITS = 6
 
 
 def versions() -> dict[str, str]:
-    """Versions of what computes a response."""
+    """Versions of the packages that compute a response."""
     return {
         "dynresp": __version__,
         "mujoco": str(mujoco.__version__),
@@ -27,7 +27,7 @@ def versions() -> dict[str, str]:
 
 
 def write_json(content: dict[str, Any], path: Path) -> None:
-    """Write an object as JSON, whole or not at all.
+    """Write an object as JSON, completely or not at all.
 
     Raises:
         DynrespError: The file cannot be written.
@@ -37,7 +37,7 @@ def write_json(content: dict[str, Any], path: Path) -> None:
 
 
 def to_json(content: dict[str, Any]) -> str:
-    """An object as JSON: floats to six decimals, null for those that are not finite."""
+    """An object as JSON: floats with six decimals, null for those that are not finite."""
     text = json.dumps(_plain(content), indent=2, allow_nan=False, ensure_ascii=False)
     # Names of files need not be UTF-8, which JSON is.
     return text.encode(errors="replace").decode()
@@ -52,4 +52,4 @@ def _plain(value: Any) -> Any:
         return round(value, _DIGITS) + 0.0 if math.isfinite(value) else None
     if value is None or isinstance(value, str | bool | int):
         return value
-    raise DynrespError(f"a {type(value).__name__} has no place in a result: {value!r}")
+    raise DynrespError(f"a {type(value).__name__} cannot be written to a result: {value!r}")

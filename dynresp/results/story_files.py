@@ -21,14 +21,14 @@ def story_writers(
     video_fps: float,
     progress: Progress,
 ) -> dict[str, Writer]:
-    """What writes each file of a story, by the file's name.
+    """A function for each file of a story, by the file's name.
 
     Args:
-        story: What is shown.
-        character: Whose motion it is.
+        story: What to show.
+        character: The character that moves.
         video_size_px: Width and height of the video.
         video_fps: Its frame rate [1/s].
-        progress: Told of the frames of the video.
+        progress: Called with the frames of the video that are drawn.
     """
 
     def video(path: Path) -> None:
@@ -70,16 +70,16 @@ def story_writers(
 def write_files(
     folder: Path, names: list[str], writers: Mapping[str, Writer], progress: Progress
 ) -> dict[str, str]:
-    """Write files one after the other, whatever may go wrong with one of them.
+    """Write files one after the other; if one fails, the others are still written.
 
     Args:
         folder: Where to; made if it is missing.
         names: Which, in this order.
-        writers: What writes each.
-        progress: Told which is being written.
+        writers: The function that writes each.
+        progress: Called with the name of the file that is being written.
 
     Returns:
-        For each what came of it, as `folder.attempt` says it.
+        For each file, what `result_folder.attempt` returned.
     """
     files = {}
     for done, name in enumerate(names):

@@ -10,7 +10,7 @@ from dynresp.specs.values import fixed
 
 
 class Strict(BaseModel):
-    """A table that knows its keys."""
+    """A table that takes no other keys than its fields, and no other types."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
@@ -20,7 +20,7 @@ def _as_table(given: Any) -> Any:
 
 
 class MotionCut(Strict):
-    """A motion, how to read its file, and which part of it is taken."""
+    """A motion, how to read its file, and which part of it to use."""
 
     motion: Annotated[str, Field(min_length=1, max_length=1000)]
     start_s: Annotated[float, fixed(0.0, 1e5, "s")] = 0.0
@@ -43,12 +43,12 @@ class MotionCut(Strict):
 
 
 class BaseMotion(MotionCut):
-    """`[base]`: what the character does when it is hit."""
+    """`[base]`: the motion that the character plays when it is hit."""
 
     otherwise: Annotated[MotionCut | None, BeforeValidator(_as_table)] = Field(None, alias="or")
 
 
 class LibraryTable(Strict):
-    """`[library]`: which reactions are chosen from."""
+    """`[library]`: the reactions to choose from."""
 
     which: Annotated[str, Field(min_length=1, max_length=1000)] = "core"

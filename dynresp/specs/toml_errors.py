@@ -1,6 +1,6 @@
-"""What is wrong with the content of a TOML file, in words: where, what was given, what is allowed.
+"""Checking a TOML file against its pydantic model, with errors in plain words.
 
-A pydantic model says what a file may hold; this is the one translator of pydantic's errors.
+Every error says where it is, what was given, and what is allowed.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Hints:
-    """What a kind of file needs for the words about its errors, beside its model.
+    """What errors about a kind of file need, beside its model.
 
     Attributes:
-        missing: By key, what to do where it is missing.
+        missing: By key, what to do if it is missing.
         inner: A field of the model that stands for keys of the table around it; files do not
             have it.
         hidden: Keys of the model that files do not have either.
@@ -58,7 +58,7 @@ def read_spec(
         path: The file.
         what: What it is, with an article, such as "an experiment file".
         hints: For the words about its errors.
-        otherwise: A sentence for somebody who named no such file.
+        otherwise: What else the user can do if there is no such file; follows the message.
 
     Raises:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
@@ -83,7 +83,7 @@ def validate(model: type[Model], content: dict[str, Any], source: str, hints: Hi
         return model.model_validate(content)
     except ValidationError as error:
         found = [dict(item) for item in error.errors()]
-    # Of a list with wrong tables in it pydantic counts only the right ones; that says nothing new.
+    # pydantic counts only the right tables of a list, and then also calls the list too short.
     lines = [_explain(item, model, content, hints) for item in found if not _miscounted(item)]
     more = len(lines) - _LISTED
     lines = [f"{source}:", *lines[:_LISTED], *([f"and {more} more"] if more > 0 else [])]
@@ -175,7 +175,7 @@ def _explain(
 
 
 def _miscounted(error: dict[str, Any]) -> bool:
-    """Whether a list is called too short that is not."""
+    """Whether a list that is long enough is called too short."""
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 

@@ -1,4 +1,4 @@
-"""Values of an experiment file: fixed, or drawn at random, with bounds and readable refusals."""
+"""Values in spec files: fixed or drawn at random, their bounds, and errors in plain words."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _MOST_CHOICES = 1000
 
 @dataclass(frozen=True)
 class Uniform:
-    """A number anywhere between two, all alike likely.
+    """A number between two, all equally likely.
 
     Attributes:
-        low: The least.
-        high: The greatest.
+        low: The smallest.
+        high: The largest.
     """
 
     low: float
@@ -29,23 +29,23 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Choice(Generic[Item]):
-    """One of several values, all alike likely.
+    """One of several values, all equally likely.
 
     Attributes:
-        values: What is chosen from.
+        values: The values.
     """
 
     values: tuple[Item, ...]
 
 
 Number: TypeAlias = float | Uniform | Choice[float]
-"""A number of an experiment file."""
+"""A number of a spec file."""
 Name: TypeAlias = str | Choice[str]
-"""A name of an experiment file."""
+"""A name of a spec file."""
 
 
 def is_random(value: object) -> bool:
-    """Whether a value is drawn anew for each hit."""
+    """Whether each hit draws its own value."""
     return isinstance(value, Uniform | Choice)
 
 
@@ -53,8 +53,8 @@ def draw(value: Any, rng: np.random.Generator) -> Any:
     """A value itself, or a draw from it.
 
     Args:
-        value: A `Number`, a `Name`, or anything else, which stays what it is.
-        rng: Where chance comes from; used only for random values.
+        value: A `Number`, a `Name`, or anything else, which is returned as it is.
+        rng: Random generator; used only for random values.
     """
     if isinstance(value, Uniform):
         return float(rng.uniform(value.low, value.high))
@@ -67,8 +67,8 @@ def number(least: float, greatest: float, unit: str) -> PlainValidator:
     """For a field of type `Number`: a number, or a random one, within bounds.
 
     Args:
-        least: The least number allowed.
-        greatest: The greatest.
+        least: The smallest number allowed.
+        greatest: The largest.
         unit: For messages, such as "m/s".
     """
     check, expected = _checker(least, greatest, unit)
@@ -123,13 +123,13 @@ def name(check: Callable[[str], None]) -> PlainValidator:
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it: short."""
+    """A value as messages show it, cut to 80 characters."""
     text = repr(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _checker(least: float, greatest: float, unit: str) -> tuple[Callable[[Any], float], str]:
-    """What checks a number, and what it expects, in words."""
+    """A function that checks a number, and what it expects, in words."""
     expected = f"a number from {least:g} to {greatest:g} {unit}".rstrip()
 
     def check(given: Any) -> float:
