@@ -1,4 +1,4 @@
-"""How fast one reaction is aligned, and how well, against trying every pair of whole frames."""
+"""Speed and error of the alignment of one reaction, beside a search of all whole frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.response.alignment.alignment import Aligner, Alignment, AlignmentConfig
 from dynresp.response.hit_simulation import HitStage
 from dynresp.response.look_ahead import look_ahead_of
-from dynresp.response.search import full_search as oracle
+from dynresp.response.search import full_search
 from dynresp.response.search.full_search_choice import reaction_tracks
 from dynresp.response.windows.windows import (
     LibraryWindows,
@@ -85,7 +85,7 @@ def simulated(seed: int, count: int, motions: Path | None = None) -> Cases:
 
 @dataclass(frozen=True)
 class Exhaustive:
-    """What the oracle found for every hit and reaction.
+    """What the full search found for every hit and reaction.
 
     Attributes:
         errors: (hits, reactions) least errors over whole frames [m].
@@ -100,7 +100,7 @@ class Exhaustive:
 
 def exhaustive(cases: Cases, windows: list[WindowSet], library: LibraryWindows) -> Exhaustive:
     """Search all reactions for every hit."""
-    found = [oracle.search(cut, library) for cut in windows]
+    found = [full_search.search(cut, library) for cut in windows]
     return Exhaustive(
         *(
             np.stack([getattr(one, name) for one in found])
@@ -115,7 +115,7 @@ def run(
     """Measure on one thread; takes about ten seconds, most of it for the simulation of the hits.
 
     Both sides begin with the bodies of a simulated trace and end with the alignment of one
-    reaction, the one that the oracle would choose. The exhaustive side cuts the windows of the
+    reaction, the one that the full search would choose. The exhaustive side cuts the windows of the
     trace and searches them; `search_alone` is without the cutting, which a search of many
     reactions does once.
 
@@ -146,11 +146,11 @@ def run(
 
     def search() -> None:
         for trace, _, row, _ in work:
-            oracle.search(trace_windows(*trace, window), alone[row])
+            full_search.search(trace_windows(*trace, window), alone[row])
 
     def search_alone() -> None:
         for _, _, row, cut in work:
-            oracle.search(cut, alone[row])
+            full_search.search(cut, alone[row])
 
     aligned = align()
     times = median_seconds(
@@ -172,14 +172,14 @@ def run(
     whole = [aligner.snap(*trace, one) for trace, one in zip(traces, aligned, strict=True)]
     snapped = np.array([one.error for one in whole]) / least
     other = np.random.default_rng(seed).integers(len(aligner.names), size=count)
-    apart = aligner.align_many(cases.positions, cases.quaternions, other).errors
-    random = apart / best.errors[rows, other]
+    other_errors = aligner.align_many(cases.positions, cases.quaternions, other).errors
+    random = other_errors / best.errors[rows, other]
     return BenchResult(
         name="align",
         value=micro["align"],
         unit="us/alignment",
         baseline=micro["search"],
-        baseline_name="exhaustive alignment: the oracle's search of the one reaction",
+        baseline_name="exhaustive alignment: the full search of the one reaction",
         ratio=micro["search"] / micro["align"],
         machine=describe_machine(("numpy", "numba")),
         more={
@@ -203,9 +203,9 @@ def run(
         notes=(
             "All times in us for one reaction on one thread, medians of interleaved rounds; batch: "
             "many traces in one call.",
-            "The reaction is the oracle's choice, or a random one; ratios are of window errors to "
-            "the exhaustive ones, which look at whole frames alone; whole_exit: moved to a whole "
-            "exit frame.",
+            "The reaction is the choice of the full search, or a random one; ratios are of window "
+            "errors to the exhaustive ones, which use whole frames only; whole_exit: moved to a "
+            "whole exit frame.",
         ),
     )
 
@@ -219,9 +219,10 @@ def _check_agreement(
     ):
         for name, error, at, entry in zip(aligner.names, errors, exits, entries, strict=True):
             found = aligner.errors(*trace, name, at, entry)
-            if not np.allclose(found, error, rtol=1e-4, atol=oracle.ERROR_FLOOR):
+            if not np.allclose(found, error, rtol=1e-4, atol=full_search.ERROR_FLOOR):
                 raise DynrespError(
-                    f"{name}: the aligner finds an error of {found:.6g} m where the oracle finds "
-                    f"{error:.6g} m; expected at most 1e-4 relative plus {oracle.ERROR_FLOOR} m "
-                    "between them. Please report this with the machine it happened on."
+                    f"{name}: the aligner finds an error of {found:.6g} m, the full search one of "
+                    f"{error:.6g} m; expected at most 1e-4 relative plus "
+                    f"{full_search.ERROR_FLOOR} m between them. Please report this with the "
+                    "machine it happened on."
                 )

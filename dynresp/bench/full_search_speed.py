@@ -1,4 +1,4 @@
-"""How fast the oracle searches: against vectorised NumPy and against its readable twin."""
+"""Speed of the full search, beside vectorised NumPy and its readable twin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult, Contender, median_seconds
 from dynresp.motion import rotations
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.search import full_search as oracle
+from dynresp.response.search import full_search
 from dynresp.response.windows.windows import (
     ReactionTrack,
     WindowErrorConfig,
@@ -56,7 +56,7 @@ def run(
         the same with every pair of windows evaluated to its end, and both ratios to the twin.
 
     Raises:
-        MotionError: Given motion is refused by the oracle.
+        MotionError: The full search refuses the given motion.
         DynrespError: The three sides disagree, which would make their times meaningless.
     """
     rng = np.random.default_rng(seed)
@@ -87,12 +87,12 @@ def run(
     def numpy_side() -> list[np.float32]:
         return [baseline(operand).min() for operand in operands]
 
-    found = oracle.search(windows, library)
+    found = full_search.search(windows, library)
     expected = np.array(numpy_side())
     times = median_seconds(
         [
-            Contender("search", lambda: oracle.search(windows, library)),
-            Contender("every pair", lambda: oracle.search(windows, library, early_stop=False)),
+            Contender("search", lambda: full_search.search(windows, library)),
+            Contender("every pair", lambda: full_search.search(windows, library, early_stop=False)),
             Contender("numpy", numpy_side),
             Contender("twin", twin, every=_TWIN_EVERY),
         ],
@@ -107,7 +107,7 @@ def run(
     pairs = len(windows) * sum(len(w) for w in library.windows) / count
     slow *= pairs / (len(windows) * len(entries))
     return BenchResult(
-        name="oracle",
+        name="search",
         value=search,
         unit="ms/reaction",
         baseline=numpy,
@@ -128,8 +128,8 @@ def run(
         },
         notes=(
             "All times in ms/reaction on one thread, medians of interleaved rounds.",
-            "The search leaves out pairs that can no longer win, with the same result; how many "
-            "depends on the motion. every_pair evaluates all of them, as NumPy and the twin do.",
+            "The search skips pairs that can no longer win, with the same result; how many depends "
+            "on the motion. every_pair compares all of them, as NumPy and the twin do.",
         ),
     )
 
@@ -228,9 +228,9 @@ def _check_agreement(
     found: npt.NDArray[np.float32], expected: npt.NDArray[np.floating], other: str
 ) -> None:
     """Refuse to report times of sides that do not compute the same."""
-    if not np.allclose(found, expected, rtol=1e-4, atol=oracle.ERROR_FLOOR):
+    if not np.allclose(found, expected, rtol=1e-4, atol=full_search.ERROR_FLOOR):
         worst = float(np.max(np.abs(found - expected)))
         raise DynrespError(
             f"the kernel and {other} differ by up to {worst:.3g} m, expected at most 1e-4 relative "
-            f"plus {oracle.ERROR_FLOOR} m. Please report this with the machine it happened on."
+            f"plus {full_search.ERROR_FLOOR} m. Please report this with the machine it happened on."
         )

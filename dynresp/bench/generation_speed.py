@@ -29,7 +29,7 @@ def run(
 ) -> BenchResult:
     """Measure on one thread; takes about ten seconds.
 
-    The loop answers one hit after another with the oracle and a finished motion, as
+    The loop answers one hit after another with the full search and a finished motion, as
     `dynresp run` does for each; both give the same labels.
 
     Args:

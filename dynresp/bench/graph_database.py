@@ -1,4 +1,4 @@
-"""Graphs and databases of any number of frames for benchmarks of motion graphs."""
+"""Graphs of specs, and databases of any number of frames, for benchmarks and studies."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.support.arrays import BoolArray
 from dynresp.support.errors import MissingMotionDataError
 
-PLANS = ("walking", "builtin")
-"""Whose motions are taken: of the first plan whose motions are on this machine."""
+SPECS = ("walking", "builtin")
+"""Specs to take motions from: the first whose motions are on this machine."""
 
-# Size of deviations of clips that are taken again [rad], with which as large a part of the pairs is
-# close as in recorded walking; their number and frequencies [Hz].
+# Deviations of repeated clips: size [rad], such that the share of close pairs is as in recorded
+# walking; number; and frequencies [Hz].
 _DEVIATION, _WAVES, _FREQUENCIES = 0.07, 4, (0.1, 1.2)
 
 
 def database_of(recorded: MotionDatabase, frames: int, rng: np.random.Generator) -> MotionDatabase:
-    """A database of so many frames.
+    """A database of a given number of frames.
 
     Args:
-        recorded: Whose clips are taken, in their order. When all are, they are taken again, every
-            time with other slow deviations of all rotations, as of another performance.
-        frames: How many.
-        rng: Source of the deviations.
+        recorded: Its clips are taken in order. Then they are taken again, each time with other
+            slow deviations of all rotations, as in another performance.
+        frames: Number of frames.
+        rng: Random numbers for the deviations.
     """
     poses: list[FloatArray] = []
     contacts: list[BoolArray] = []
@@ -58,7 +58,7 @@ def database_of(recorded: MotionDatabase, frames: int, rng: np.random.Generator)
 
 
 def _deviating(poses: FloatArray, fps: float, rng: np.random.Generator) -> FloatArray:
-    """Poses (n, 59) whose root and joints turn a little otherwise."""
+    """Poses (n, 59) with slow random deviations of root and joints."""
     time_s = np.arange(len(poses)) / fps
     turns = np.zeros((len(poses), 14, 3))
     for _ in range(_WAVES):
@@ -72,18 +72,17 @@ def _deviating(poses: FloatArray, fps: float, rng: np.random.Generator) -> Float
 def graphs_at_hand(
     names: Sequence[str], folders: Sequence[Path], character: Character, needed: bool = False
 ) -> Iterator[tuple[str, MotionGraph]]:
-    """The graphs of plans, one after the other, with the names of their plans.
+    """The graphs of graph specs, one after the other, with the names of the specs.
 
     Args:
-        names: Of plans that come with dynresp, or plan files.
+        names: Of specs that come with dynresp, or spec files.
         folders: Motions folders.
         character: The character.
-        needed: Whether all must be there; else those are left out whose motions are not on this
-            machine.
+        needed: Whether all motions must be on this machine; else specs without them are left out.
 
     Raises:
-        MissingMotionDataError: Motions are not on this machine and were needed.
-        DynrespError: There is no such plan, or motions cannot be read.
+        MissingMotionDataError: Needed motions are not on this machine.
+        DynrespError: There is no such spec, or motions cannot be read.
     """
     for name in names:
         path = find_graph_spec(name)
@@ -98,34 +97,34 @@ def graphs_at_hand(
 
 @functools.lru_cache(maxsize=8)
 def _built(path: Path, folders: tuple[Path, ...], character: Character) -> MotionGraph:
-    """The graph of a plan; most of the time goes into reading motions, and parts share them."""
+    """The graph of a spec; cached, since reading the motions takes most of the time."""
     return build_graph(read_graph_spec(path), folders, path.parent, character, lambda *_: None)
 
 
 def recorded_database(motions: Path | None, character: Character) -> tuple[str, MotionDatabase]:
-    """The frames of the first plan whose motions are on this machine.
+    """The frames of the first spec whose motions are on this machine.
 
     Args:
         motions: Motions folder.
         character: The character.
 
     Returns:
-        Name of the plan, and its frames.
+        Name of the spec, and its frames.
 
     Raises:
         DynrespError: Motions cannot be read.
     """
-    for name, graph in graphs_at_hand(PLANS, motion_folders(motions), character):
+    for name, graph in graphs_at_hand(SPECS, motion_folders(motions), character):
         return name, graph.database
     raise MissingMotionDataError("built-in motion is missing; install dynresp again")
 
 
-def about(plan: str, frames: int, recorded: int) -> str:
-    """A sentence on what a database was made of: of which plan, and how many were recorded."""
-    source = f"the {frames:,} frames are the first of the plan {plan!r}"
-    if plan == PLANS[-1]:
+def about(spec: str, frames: int, recorded: int) -> str:
+    """A sentence on the source of a database: the spec, and how many frames were recorded."""
+    source = f"the {frames:,} frames are the first of the spec {spec!r}"
+    if spec == SPECS[-1]:
         source += ", built-in motion and no motion capture"
     if frames > recorded:
         source = source.replace("the first of", f"{recorded:,} of")
-        source += ", and those again with slow random deviations"
+        source += ", repeated with slow random deviations"
     return source + "."

@@ -1,4 +1,4 @@
-"""How fast a motion graph is built, and how fast it is walked.
+"""Speed of building a motion graph, and of walking through it.
 
 The size is that of the terrain example of Lee et al. 2002 (table 1), 12,879 frames, and the first
 pruning rule is in its loose form: about forty times as many pairs are compared as in the strict
@@ -70,7 +70,7 @@ def run(
         `value` is the time from a database to a graph of one component, on all cores.
 
     Raises:
-        DynrespError: NumPy does not find the same jumps, or motions cannot be read.
+        DynrespError: NumPy finds other jumps, or motions cannot be read.
     """
     character = default_character()
     plan, recorded = recorded_database(motions, character)
@@ -146,7 +146,7 @@ def run(
 def _check_agreement(
     database: MotionDatabase, pruning: NumpyPruning, blocks: Sequence[Block]
 ) -> None:
-    """Refuse times of things that differ. Where rounding may decide, either answer will do.
+    """Refuse times of results that differ; where rounding decides, both are accepted.
 
     Raises:
         DynrespError: The jumps differ.
@@ -195,8 +195,8 @@ def _peaks(database: MotionDatabase) -> tuple[float, float]:
 def _status_mib(name: str) -> float:
     """A figure that Linux keeps of this process. getrusage would count the parent's peak, too."""
     lines = Path("/proc/self/status").read_text().splitlines()
-    told = dict(line.split(":", 1) for line in lines)
-    return int(told[name].split()[0]) / 1024.0
+    values = dict(line.split(":", 1) for line in lines)
+    return int(values[name].split()[0]) / 1024.0
 
 
 def _file(graph: MotionGraph) -> dict[str, float]:

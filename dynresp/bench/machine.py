@@ -1,4 +1,4 @@
-"""What machine and which versions a benchmark ran on."""
+"""Describe the machine and the versions that a benchmark ran on."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def describe_machine(packages: Sequence[str] = ("numpy", "numba", "mujoco")) -> 
     """Processor, cores this process may use, system, and versions of what was measured.
 
     Args:
-        packages: Distributions whose versions matter; None is given for those not installed.
+        packages: Distributions to report; the version is None for those not installed.
 
     Returns:
         A dictionary that `json` can write.
@@ -29,7 +29,7 @@ def describe_machine(packages: Sequence[str] = ("numpy", "numba", "mujoco")) -> 
 
 
 def machine_line(machine: dict[str, object]) -> str:
-    """One line for people out of `describe_machine`."""
+    """`describe_machine` as one line for people."""
     versions = machine["versions"]
     shown = versions.items() if isinstance(versions, dict) else ()
     packages = ", ".join(f"{name} {version}" for name, version in shown)

@@ -1,4 +1,4 @@
-"""How benchmarks measure, and what they report."""
+"""Time the sides of a comparison, and report the result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Contender:
     Attributes:
         name: Name under which its time is returned.
         call: What is timed.
-        every: It takes part in every so many rounds, so that a slow side is timed less often.
+        every: Timed in every n-th round only, so that a slow side takes part less often.
     """
 
     name: str
@@ -32,14 +32,14 @@ class BenchResult:
 
     Attributes:
         name: Name of the benchmark.
-        value: What was measured.
+        value: The measured value.
         unit: Unit of `value` and `baseline`.
         baseline: The same quantity for what it is compared with.
-        baseline_name: What that is.
+        baseline_name: What it is compared with.
         ratio: How many times better `value` is than `baseline`.
         machine: See `describe_machine`.
-        more: Further figures, by name.
-        notes: Sentences that say how to read the figures.
+        more: Further values, by name.
+        notes: Sentences on how to read the values.
     """
 
     name: str
@@ -53,7 +53,7 @@ class BenchResult:
     notes: Sequence[str] = ()
 
     def to_json(self) -> dict[str, object]:
-        """One flat object with all figures, for `json`."""
+        """One flat object with all values, for `json`."""
         return {
             "name": self.name,
             "value": self.value,
@@ -66,7 +66,7 @@ class BenchResult:
         }
 
     def to_text(self) -> str:
-        """The report for people: machine, value, baseline, ratio, further figures, notes."""
+        """The report for people: machine, value, baseline, ratio, further values, notes."""
         lines = [
             f"{self.name}",
             f"  machine   {machine_line(self.machine)}",
@@ -82,9 +82,9 @@ class BenchResult:
 
 
 def median_seconds(contenders: Sequence[Contender], rounds: int) -> dict[str, float]:
-    """Time all sides in turn, round after round, so that a busy machine slows all alike.
+    """Time all sides in turn, round after round, so that other load slows all of them alike.
 
-    Whoever calls this warms up before (compilation, caches).
+    The caller warms up before (compilation, caches).
 
     Args:
         contenders: The sides.

@@ -89,7 +89,7 @@ def run(seed: int = 0, *, model: Path | None = None) -> BenchResult:
     value, baseline = times.pop("reduced_alone"), times.pop("reduced_sklearn_alone")
     exact = subject.pipelines["exact"]
     return BenchResult(
-        name="select",
+        name="predict",
         value=value,
         unit="us/prediction",
         baseline=baseline,

@@ -1,4 +1,4 @@
-"""From a hit to a finished plan on one core: how long the frame takes in which it happens."""
+"""Time from a hit to a finished response on one core: the frame in which the hit happens."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ EXAMPLE = "balls_500.toml"
 FRAME_MS = 1000.0 / 60.0
 """A frame at 60 a second [ms]."""
 WAITED = 10
-"""Frames after a ball was due for which it is waited."""
+"""How many frames a ball may be late."""
 
 
 def run(
@@ -50,8 +50,8 @@ def run(
 ) -> BenchResult:
     """Hit a character at run time, one ball after another, on one thread.
 
-    Timed is the whole frame in which the ball hits: one frame of the simulation, the look-ahead,
-    the choice, the alignment and the rewind.
+    The time is of the whole frame in which the ball hits: one frame of the simulation, the
+    look-ahead, the choice, the alignment and the rewind.
 
     Args:
         seed: Seed of the balls.
@@ -61,12 +61,12 @@ def run(
         hits: How many balls.
 
     Returns:
-        `value` is the median with the budget "fast", `baseline` that of the oracle. The further
-        figures hold the 95th percentiles, the other budgets, those with a second pass, and the
-        stages.
+        `value` is the median with the budget "fast", `baseline` that of the full search. The
+        further values hold the 95th percentiles, the other budgets, those with a second pass, and
+        the stages.
 
     Raises:
-        DynrespError: Not one ball hits.
+        DynrespError: Fewer than two balls hit.
     """
     experiment = read_experiment(example_specs("experiments") / EXAMPLE)
     loaded = prepare_run(
@@ -74,7 +74,7 @@ def run(
     )
     trained = find_classifier(loaded.library, loaded.character, classifier)
     if trained is None:
-        # Without a classifier for the library that is on this machine: all of it built in.
+        # No classifier for the library on this machine: use the built-in one.
         library = builtin_library(loaded.character, loaded.config.physics.fps)
         loaded = replace(loaded, library=library)
         trained = find_classifier(library, loaded.character)
@@ -96,15 +96,15 @@ def run(
     stages = _stages(loaded, trained, hits)
     more |= {f"{name}_ms": 1e3 * value for name, value in stages.items()}
     predicted = stages["stage_predict_reduced"] + stages["stage_align"]
-    more["oracle_over_prediction_and_alignment"] = stages["stage_oracle"] / predicted
-    more["oracle_over_whole_choice"] = stages["stage_oracle"] / stages["stage_choice"]
+    more["search_over_prediction_and_alignment"] = stages["stage_search"] / predicted
+    more["search_over_whole_choice"] = stages["stage_search"] / stages["stage_choice"]
     fast = 1e3 * times["fast"]
     return BenchResult(
         name="respond",
         value=float(np.median(fast)),
         unit="ms",
         baseline=float(more["best_ms"]),
-        baseline_name="the oracle, exhaustive search and alignment",
+        baseline_name="the full search, with exhaustive alignment",
         ratio=float(more["best_ms"]) / float(np.median(fast)),
         machine=describe_machine(("numpy", "numba", "mujoco")),
         more={
@@ -117,7 +117,7 @@ def run(
         },
         notes=(
             f"one core; a 60 Hz frame is {FRAME_MS:.1f} ms",
-            "with a second pass the rest of the simulation is made in the same frame, too",
+            "with a second pass the rest of the simulation is done in the same frame, too",
             "stage_choice: features, prediction, the base motion's fit, alignment, with all Python",
         ),
     )
@@ -139,7 +139,9 @@ def _contact_frames(loaded: Run, config: ResponseConfig, chooser: Chooser, hits:
         if responder.phase is Phase.PHYSICS:
             seconds.append(passed)
     if len(seconds) < 2:
-        raise DynrespError("hardly any ball has hit, so there is nothing to time; try another seed")
+        raise DynrespError(
+            "fewer than two balls have hit, so there is nothing to time; try another --seed"
+        )
     # The first compiles kernels and scenes.
     return np.array(seconds[1:])
 
@@ -150,7 +152,7 @@ def _stages(loaded: Run, classifier: Classifier, hits: int) -> dict[str, float]:
     stage = HitStage(character, config, 1)
     aligner = Aligner(reaction_tracks(character, loaded.library, config), config.window)
     fast = chooser_for("fast", character, loaded.library, config, classifier)
-    oracle = chooser_for("best", character, loaded.library, config)
+    search = chooser_for("best", character, loaded.library, config)
     seconds: dict[str, list[float]] = {}
 
     def timed(name: str, call: Callable[[], Any]) -> Any:
@@ -183,6 +185,6 @@ def _stages(loaded: Run, classifier: Classifier, hits: int) -> dict[str, float]:
         trace = seen.states.centers[0], seen.states.quaternions[0]
         timed("align", functools.partial(aligner.align, *trace, aligner.names[:1]))
         timed("choice", functools.partial(fast.choose, seen))
-        timed("oracle", functools.partial(oracle.choose, seen))
+        timed("search", functools.partial(search.choose, seen))
         timed("rewind", functools.partial(simulation.rewind, 0, contact.frame))
     return {name: float(np.median(values)) for name, values in seconds.items()}

@@ -30,7 +30,7 @@ def physics(seed: Seed = None, as_json: Json = False) -> None:
 
 
 @app.command()
-def oracle(seed: Seed = None, as_json: Json = False) -> None:
+def search(seed: Seed = None, as_json: Json = False) -> None:
     """Measure the full search (oracle), beside NumPy and plain Python."""
     typer.echo("searching for about five seconds ...", err=True)
     from dynresp.bench import full_search_speed as bench
@@ -48,7 +48,7 @@ def align(seed: Seed = None, as_json: Json = False) -> None:
 
 
 @app.command()
-def select(
+def predict(
     classifier: Annotated[
         Path | None,
         typer.Option(

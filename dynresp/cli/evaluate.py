@@ -1,4 +1,4 @@
-"""`dynresp evaluate`: how well a classifier chooses."""
+"""`dynresp evaluate`: measure how well a classifier chooses."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def evaluate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Judge a classifier by samples that it was not trained on, with baselines beside it.
+    """Measure how well a classifier chooses, beside simple baselines.
 
-    Of the dataset that it was trained on, only the samples held out count; of any other, all.
+    Of its own training dataset only the held-out samples count; of any other dataset all.
     """
     from dynresp.cli.run import check_folder, exit_if_failed, report_unwritten
     from dynresp.cli.train import with_elapsed
@@ -39,17 +39,17 @@ def evaluate(
     require("pyarrow", "sklearn")
     if out is not None:
         check_folder(out)
-    with progress() as told:
-        tell = with_elapsed(told)
+    with progress() as plain:
+        tell = with_elapsed(plain)
         tell("reading", 0, 1)
         from dynresp.datasets.dataset_reader import load_dataset
-        from dynresp.learning import evaluation as judging
+        from dynresp.learning import evaluation
         from dynresp.response.prediction.classifier_file import load_classifier
         from dynresp.results.result_folder import WRITTEN
         from dynresp.results.result_json import to_json
 
         files: dict[str, str] = {}
-        content = judging.evaluate(load_classifier(model), load_dataset(dataset), tell)
+        content = evaluation.evaluate(load_classifier(model), load_dataset(dataset), tell)
         if out is not None:
             tell("writing", 0, 1)
             from dynresp.learning.evaluation_files import write_report
@@ -57,32 +57,32 @@ def evaluate(
             files = write_report(out, content)
     if content["differing_settings"]:
         typer.echo(
-            "dynresp: the dataset was made under other settings than the classifier was trained "
-            f"for: {', '.join(content['differing_settings'])}",
+            "dynresp: the dataset was made with other settings than the training data: "
+            f"{', '.join(content['differing_settings'])}",
             err=True,
         )
     report_unwritten(files)
     if as_json:
         typer.echo(to_json(content))
     else:
-        typer.echo(_told(content))
+        typer.echo(_text(content))
         if out is not None:
             written = [name for name, what in files.items() if what == WRITTEN]
             typer.echo(f"  written    {out}: {', '.join(written)}")
     exit_if_failed(files)
 
 
-def _told(content: dict[str, Any]) -> str:
-    from dynresp.cli.train import figures_told
+def _text(content: dict[str, Any]) -> str:
+    from dynresp.cli.train import choice_metrics_text
 
     model, dataset, left = content["model"], content["dataset"], content["left_out"]
     which = "held-out samples" if content["held_out_only"] else "samples"
     lines = [
         f"{model['grouping']} of the library {dataset['library']!r}, trained on "
         f"{model['trained_on']['samples']} samples",
-        f"  judged by  {content['samples']} {which} of {dataset['plan']!r}; left out: "
-        f"{left['nothing_hit']} in which nothing was hit, {left['features_missing']} with features "
-        f"missing, {left['not_held_out']} not held out",
+        f"  measured   {content['samples']} {which} of {dataset['plan']!r}; left out: "
+        f"{left['nothing_hit']} missed or diverged, {left['features_missing']} with missing "
+        f"features, {left['not_held_out']} trained on",
     ]
     rows = {
         "exact": content,
@@ -91,21 +91,20 @@ def _told(content: dict[str, Any]) -> str:
     }
     for name, row in rows.items():
         if row is None:
-            lines.append(f"  {name}: needs the samples trained on, which are not in this dataset")
+            lines.append(f"  {name}: needs the training samples, which are not in this dataset")
             continue
         as_one = row["mirrors_as_one"]
         lines += [
             f"  {name}",
-            f"    in use           {figures_told(row)}",
-            f"    alone            {figures_told(row['alone'])}",
+            f"    in use           {choice_metrics_text(row)}",
+            f"    alone            {choice_metrics_text(row['alone'])}",
             f"    mirrors as one   accuracy {as_one['accuracy']:.1%}, two best "
             f"{as_one['top2_accuracy']:.1%}; strategy {row['strategy_accuracy']:.1%}",
         ]
     lines.append(f"  reduced and exact agree in {content['reduced']['agreement']:.1%}")
     for name, took in content["latency_us"].items():
         lines.append(
-            f"  {name:<10} {took['alone']:.1f} us alone, {took['in_batch']:.1f} us each of a "
-            "thousand"
+            f"  {name:<10} {took['alone']:.1f} us alone, {took['in_batch']:.1f} us each in batches"
         )
     lines.append(f"  {'strategy':<26}{'samples':>9}{'accuracy':>10}{'two best':>10}{'regret':>9}")
     for name, row in content["per_strategy"].items():
@@ -113,4 +112,8 @@ def _told(content: dict[str, Any]) -> str:
             f"  {name:<26}{row['samples']:>9}{row['accuracy']:>10.1%}"
             f"{row['top2_accuracy']:>10.1%}{row['regret']:>9.2%}"
         )
+    lines += [
+        "  in use: the responder itself measures whether a reaction is needed; alone: not",
+        "  regret: mean excess of the mismatch of the choice over that of the full search",
+    ]
     return "\n".join(lines)

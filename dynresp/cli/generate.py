@@ -1,4 +1,4 @@
-"""`dynresp generate`: from a plan file to a folder of training data."""
+"""`dynresp generate`: make a folder of training data from a dataset spec."""
 
 from __future__ import annotations
 
@@ -16,91 +16,101 @@ from dynresp.cli.options import Json, Motions, Seed
 from dynresp.cli.progress_bar import progress
 from dynresp.support.progress import Progress
 
-# Time over which the rate is measured [s]; a bar is refreshed, and lines follow, this often [s].
+# The rate is measured over the last minute; a bar is refreshed, or a line written, this often [s].
 _RATE_S = 60.0
 _BAR_S, _LINE_S = 0.5, 20.0
 
 
 def generate(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="The plan file.")],
+    spec: Annotated[Path, typer.Argument(metavar="SPEC.toml", help="The dataset spec.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the dataset.")],
     count: Annotated[
         int | None,
         typer.Option(
-            "--count", min=1, max=10_000_000, help="How many samples, in place of the plan's."
+            "--count", min=1, max=10_000_000, help="Number of samples, in place of the spec's."
         ),
     ] = None,
     seed: Seed = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", min=1, max=1024, help="Processes here; by default one a core."),
+        typer.Option("--workers", min=1, max=1024, help="Processes; by default one per core."),
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
             "--scheduler",
             metavar="ADDRESS",
-            help="A Dask scheduler whose workers do it, as tcp://host:8786 or tls://host:8786.",
+            help="Dask scheduler whose workers do the work: tcp://host:8786 or tls://host:8786.",
         ),
     ] = None,
     shard_size: Annotated[
         int | None,
-        typer.Option("--shard-size", min=1, max=100_000, help="Samples of a file; by default 500."),
+        typer.Option("--shard-size", min=1, max=100_000, help="Samples per file; by default 500."),
     ] = None,
     motions: Motions = None,
     as_json: Json = False,
 ) -> None:
-    """Make training data: draw hits from a plan, simulate them, and let the oracle choose.
+    """Make training data: draw random hits, simulate them, find the best reaction to each.
 
-    However it was interrupted, the same command goes on where it stopped. A larger --count extends
-    the dataset; damaged files are found and made again.
+    After an interruption, the same command continues where it stopped. A larger --count extends
+    the dataset. Damaged files are made again.
     """
-    from dynresp.datasets.dataset_spec_reader import read_plan
+    from dynresp.datasets.dataset_spec_reader import read_dataset_spec
     from dynresp.support.errors import UsageError
 
     if scheduler is not None and workers is not None:
         raise UsageError(
-            "--workers is of this machine, and with --scheduler the cluster's workers do it; give "
-            "one of them"
+            "--workers sets processes on this machine, --scheduler uses those of a cluster; give "
+            "only one of them"
         )
-    file = read_plan(plan).changed(count, seed)
+    checked = read_dataset_spec(spec).changed(count, seed)
     with progress() as tell:
         tell("reading", 0, 1)
-        from dynresp.datasets import generation as making
+        from dynresp.datasets import generation
 
-        summary = making.generate(
-            file, plan.parent, out, motions, workers, scheduler, shard_size, _paced(tell), _warn
+        summary = generation.generate(
+            checked,
+            spec.parent,
+            out,
+            motions,
+            workers,
+            scheduler,
+            shard_size,
+            _with_rate(tell),
+            _warn,
         )
     content = summary.to_json()
-    typer.echo(json.dumps(content, indent=2) if as_json else _told(content))
+    typer.echo(json.dumps(content, indent=2) if as_json else _text(content))
 
 
-def _paced(tell: Progress) -> Progress:
-    """Adds rate and time left to what is told while samples are made."""
+def _with_rate(tell: Progress) -> Progress:
+    """Progress with rate and time left while samples are made."""
     on_terminal = sys.stderr.isatty()
     every = _BAR_S if on_terminal else _LINE_S
     seen: deque[tuple[float, int]] = deque()
-    said, said_at = "", 0.0
+    text, written_at = "", 0.0
 
-    def paced(stage: str, done: int, of: int) -> None:
-        nonlocal said, said_at
+    def with_rate(stage: str, done: int, of: int) -> None:
+        nonlocal text, written_at
         now = time.monotonic()
         if stage != "labelling":
             seen.clear()
-            said = stage
+            text = stage
         else:
             seen.append((now, done))
             while now - seen[0][0] > _RATE_S:
                 seen.popleft()
-            if not said.startswith(stage) or now - said_at >= every:
-                said = _pace(stage, done, of, seen, counted=not on_terminal)
-                said_at = now
-        tell(said, done, of)
+            if not text.startswith(stage) or now - written_at >= every:
+                text = _rate_text(stage, done, of, seen, counted=not on_terminal)
+                written_at = now
+        tell(text, done, of)
 
-    return paced
+    return with_rate
 
 
-def _pace(stage: str, done: int, of: int, seen: deque[tuple[float, int]], counted: bool) -> str:
+def _rate_text(
+    stage: str, done: int, of: int, seen: deque[tuple[float, int]], counted: bool
+) -> str:
     words = [stage]
     if counted:
         words.append(f"{done} of {of}")
@@ -135,7 +145,7 @@ def _counted(number: int, what: str) -> str:
     return f"{number} {what if number == 1 else many}"
 
 
-def _told(content: dict[str, Any]) -> str:
+def _text(content: dict[str, Any]) -> str:
     lines = [
         f"{_counted(content['samples'], 'sample')} in {_counted(content['shards'], 'shard')}",
         f"  outcomes   {_counted(content['hits'], 'hit')}, "

@@ -1,4 +1,4 @@
-"""`dynresp train`: from a dataset to a classifier."""
+"""`dynresp train`: train a classifier on a dataset."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dynresp.support.progress import Progress
 if TYPE_CHECKING:
     from dynresp.response.prediction.classifier import Classifier
 
-# Where there is no terminal, a line that work goes on follows this often [s].
+# Without a terminal, progress writes a line this often [s].
 _LINE_S = 20.0
 
 
@@ -47,57 +47,63 @@ def train(
         typer.Option(
             "--out",
             metavar="MODEL",
-            help="The file, *.skops; by default where `dynresp run` finds it.",
+            help="File to write, *.skops; by default where `dynresp run` finds it.",
         ),
     ] = None,
     vector: Annotated[
-        Vector, typer.Option("--vector", help="All states of the bodies, or a few with balance.")
+        Vector,
+        typer.Option(
+            "--vector", help="Features: states of the bodies (large), or 20 numbers (small)."
+        ),
     ] = Vector.large,
     slices: Annotated[
         str | None,
         typer.Option(
             "--slices",
             metavar="S,S,...",
-            help="Times after contact to tell the states of, as 0,0.1,0.2,0.3; by default all.",
+            help="Use only features of these times after contact [s], such as 0,0.1,0.2,0.3.",
         ),
     ] = None,
     classes: Annotated[
         Grouping,
-        typer.Option("--classes", help="One class for each reaction, or for each strategy."),
+        typer.Option("--classes", help="One class per reaction, or one per strategy."),
     ] = Grouping.reactions,
     samples: Annotated[
         int | None,
-        typer.Option("--samples", min=2, help="Train on so many samples at most."),
+        typer.Option("--samples", min=2, help="Train on at most this many samples."),
     ] = None,
     held_out: Annotated[
         float,
         typer.Option(
-            "--held-out", min=0.0, max=0.9, help="Share of the samples to judge by, not to train."
+            "--held-out", min=0.0, max=0.9, help="Share of the samples kept for the evaluation."
         ),
     ] = 0.1,
     compiled_only: Annotated[
         bool,
         typer.Option(
             "--compiled-only",
-            help="In single precision, without the scikit-learn pipelines and thus without any "
-            "training sample.",
+            help="Leave out the scikit-learn pipelines, and so all training samples; single "
+            "precision. A smaller file that can be passed on.",
         ),
     ] = False,
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
-    """Train a classifier to choose as the oracle chose, and judge it by samples held out."""
+    """Train a classifier to choose the reaction that the full search chose.
+
+    Then measure it on samples that were not trained on.
+    """
     from dynresp.cli.run import check_folder
     from dynresp.support.errors import UsageError
     from dynresp.support.extras import require
 
     require("pyarrow", "sklearn", "skops")
     if out is not None and (out.suffix != ".skops" or out.is_dir()):
-        raise UsageError(f"--out: {str(out)!r}: expected a file whose name ends in .skops")
+        raise UsageError(f"--out: {str(out)!r}: expected a file name that ends in .skops")
     if out is not None:
         check_folder(out.parent)
-    with progress() as told:
-        tell = with_elapsed(told)
+    with progress() as plain:
+        tell = with_elapsed(plain)
         tell("reading", 0, 1)
         from dynresp.datasets.dataset_reader import load_dataset
         from dynresp.learning import training as learning
@@ -126,30 +132,30 @@ def train(
     if as_json:
         typer.echo(json.dumps(_content(trained.classifier, file), indent=2))
     else:
-        typer.echo(_told(trained.classifier, file))
+        typer.echo(_text(trained.classifier, file))
 
 
 def with_elapsed(tell: Progress, clock: Callable[[], float] = time.monotonic) -> Progress:
-    """Adds the time that a stage has taken; where there is no terminal, only now and then.
+    """Progress with the time that a stage has taken; without a terminal only every 20 s.
 
     Args:
-        tell: What to tell.
-        clock: Seconds that pass.
+        tell: The progress to call.
+        clock: Gives seconds.
     """
     every = 0.0 if sys.stderr.isatty() else _LINE_S
-    stage, began, said_at = "", 0.0, 0.0
+    stage, began, written_at = "", 0.0, 0.0
 
-    def told(now_in: str, done: int, of: int) -> None:
-        nonlocal stage, began, said_at
+    def with_time(current: str, done: int, of: int) -> None:
+        nonlocal stage, began, written_at
         now = clock()
-        if now_in != stage:
-            stage, began, said_at = now_in, now, now
+        if current != stage:
+            stage, began, written_at = current, now, now
             tell(stage, done, of)
-        elif now - said_at >= every:
-            said_at = now
+        elif now - written_at >= every:
+            written_at = now
             tell(f"{stage}, {now - began:.0f} s", done, of)
 
-    return told
+    return with_time
 
 
 def _slices(given: str) -> tuple[float, ...]:
@@ -159,7 +165,7 @@ def _slices(given: str) -> tuple[float, ...]:
         return tuple(float(part) for part in given.split(","))
     except ValueError:
         raise UsageError(
-            f"--slices: expected times in seconds, as 0,0.1,0.2,0.3, got {given!r}"
+            f"--slices: expected times in seconds such as 0,0.1,0.2,0.3, got {given!r}"
         ) from None
 
 
@@ -177,14 +183,14 @@ def _content(classifier: Classifier, file: Path) -> dict[str, Any]:
     }
 
 
-def _told(classifier: Classifier, file: Path) -> str:
+def _text(classifier: Classifier, file: Path) -> str:
     facts, on = classifier.facts, classifier.trained_on
     slices = ", ".join(f"{slice_s:g}" for slice_s in facts["slices_s"])
     best = facts["models"]["exact"]
     lines = [
         f"trained on {on.samples} samples for the library {classifier.trained_for.library_name!r} "
         f"in {facts['training_s']:.0f} s",
-        f"  left out   {facts['left_out']} samples without contact, diverged or incomplete",
+        f"  left out   {facts['left_out']} samples: missed, diverged or incomplete",
         f"  classes    {len(classifier.classes)} {classifier.grouping}",
         f"  features   {len(classifier.feature_names)}, {facts['vector']}, at {slices} s",
         f"  parameters C {best['penalty']:g}, gamma {best['gamma_factor']:g} of scale",
@@ -198,14 +204,14 @@ def _told(classifier: Classifier, file: Path) -> str:
         )
         held = model["held_out"]
         if held is not None:
-            lines.append(f"    of {held['samples']} held out, in use   {figures_told(held)}")
-            lines.append(f"    alone            {figures_told(held['alone'])}")
+            lines.append(f"    of {held['samples']} held out, in use   {choice_metrics_text(held)}")
+            lines.append(f"    alone            {choice_metrics_text(held['alone'])}")
     lines.append(f"  written    {file}")
     return "\n".join(lines)
 
 
-def figures_told(figures: dict[str, Any]) -> str:
-    """Accuracy and regret in a line."""
+def choice_metrics_text(figures: dict[str, Any]) -> str:
+    """Accuracy and regret in one line."""
     return (
         f"accuracy {figures['accuracy']:.1%}, two best {figures['top2_accuracy']:.1%}, "
         f"within 1 % {figures['within_1_percent']:.1%}, regret {figures['regret']:.2%}, "

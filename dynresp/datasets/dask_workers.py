@@ -1,7 +1,7 @@
 """Workers of a Dask cluster, which may be other machines.
 
-A worker gets the plan and loads motions and library itself; shards come back to the program that
-asked, which alone writes. How a connection is made safe (TLS) is Dask's own configuration.
+A worker gets the spec, and loads motions and library itself. Shards come back to the main program,
+which alone writes. TLS is set in Dask's own configuration.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from dynresp.datasets.sample_worker import Job, Workshop, load
-from dynresp.datasets.shards import Place
+from dynresp.datasets.sample_worker import Job, SampleWorker, load_worker
+from dynresp.datasets.shards import ShardRange
 from dynresp.support.errors import DynrespError, UsageError
 from dynresp.support.extras import require
 
 if TYPE_CHECKING:
     from distributed import Client
 
-# Shards in flight for each thread of the cluster, so that none waits for the next; and at least.
-_AHEAD, _LEAST = 2, 4
+# Shards in flight for each thread of the cluster, so that no thread waits; and at least.
+_SHARDS_PER_THREAD, _MIN_IN_FLIGHT = 2, 4
 _CONNECT_S = 20.0
-# Beyond that, for Dask to say itself why it could not connect.
-_GRACE_S = 1.0
-_LOOK_S = 0.5
+# Extra time for Dask's own error message.
+_EXTRA_S = 1.0
+_POLL_S = 0.5
 _ADDRESS = re.compile(r"(tcp|tls)://[^/\s]+:\d{1,5}")
-# Loaded once in each thread of a worker: a workshop is no thing for two threads at once.
-_own = threading.local()
+# Loaded once in each thread of a worker: it is not thread-safe.
+_thread_state = threading.local()
 
 
-def make_there(
-    job: Job, wanted: Sequence[Place], address: str, waiting: Callable[[], None]
-) -> Generator[tuple[Place, bytes], None, None]:
-    """Make shards by the workers of a running Dask scheduler.
+def make_on_cluster(
+    job: Job, wanted: Sequence[ShardRange], address: str, waiting: Callable[[], None]
+) -> Generator[tuple[ShardRange, bytes], None, None]:
+    """Make shards with the workers of a running Dask scheduler.
 
     A shard whose worker dies is done by another one.
 
@@ -47,10 +47,10 @@ def make_there(
         job: The job.
         wanted: The shards.
         address: Of the scheduler, such as "tcp://10.0.0.1:8786" or "tls://...".
-        waiting: Called once where the scheduler has no workers yet.
+        waiting: Called once if the scheduler has no workers yet.
 
     Yields:
-        A shard and its Parquet file, in whatever order they are done.
+        Each shard with its Parquet file, in the order in which they are finished.
 
     Raises:
         MissingExtraError: Dask is not installed.
@@ -59,19 +59,19 @@ def make_there(
             many workers died of one shard.
     """
     security = connection_security(address)
-    with _quiet():
-        client = _connected(address, security)
+    with _without_logging():
+        client = _connect(address, security)
         try:
-            _await_workers(client, address, waiting)
-            yield from _made(client, job, wanted, address)
+            _wait_for_workers(client, address, waiting)
+            yield from _shards_from_cluster(client, job, wanted, address)
         finally:
-            # Takes back what is in flight, too.
+            # Cancels the shards in flight, too.
             with suppress(Exception):
                 client.close(timeout=2)
 
 
 def connection_security(address: str) -> Any:
-    """How Dask's configuration makes connections safe; nothing is connected yet.
+    """The security settings of Dask's configuration; does not connect.
 
     Args:
         address: Of the scheduler.
@@ -97,7 +97,7 @@ def connection_security(address: str) -> Any:
         _check_files(security)
         safe = security.get_connection_args("client").get("ssl_context") is not None
     except (OSError, ValueError, TypeError) as error:
-        raise UsageError(f"Dask's configuration of TLS is wrong: {_short(error)}") from None
+        raise UsageError(f"Dask's configuration of TLS is wrong: {_error_text(error)}") from None
     if address.startswith("tls:") and not safe:
         raise UsageError(
             f"--scheduler: {address!r} needs certificates, and Dask's configuration names none; "
@@ -107,15 +107,15 @@ def connection_security(address: str) -> Any:
 
 
 def _check_files(security: Any) -> None:
-    """Refuse certificates that cannot be read, by name: the errors of Python's ssl have none."""
+    """Refuse certificates that cannot be read, with their names, which the errors of ssl lack."""
     places = {"ca_file": "ca-file", "cert": "client.cert", "key": "client.key"}
     files = security.get_tls_config_for_role("client")
     if not (files.get("ca_file") and files.get("cert")):
-        # Dask makes no use of one without the other.
+        # Dask uses both or neither.
         return
-    for key, place in places.items():
+    for key, shard in places.items():
         path = files.get(key)
-        # What has several lines is the certificate itself.
+        # A value with several lines is the certificate itself.
         if path is None or "\n" in path:
             continue
         try:
@@ -123,14 +123,14 @@ def _check_files(security: Any) -> None:
                 pass
         except OSError as error:
             raise UsageError(
-                f"Dask's configuration of TLS is wrong: distributed.comm.tls.{place}: {path!r} "
+                f"Dask's configuration of TLS is wrong: distributed.comm.tls.{shard}: {path!r} "
                 f"cannot be read ({error.strerror})"
             ) from None
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep Dask from logging: what becomes of the connection is said in the product's own words."""
+def _without_logging() -> Iterator[None]:
+    """Silence Dask's logging; dynresp has its own messages about the connection."""
     names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
     levels = {name: logging.getLogger(name).level for name in names}
     for name in names:
@@ -142,7 +142,7 @@ def _quiet() -> Iterator[None]:
             logging.getLogger(name).setLevel(level)
 
 
-def _connected(address: str, security: Any) -> Client:
+def _connect(address: str, security: Any) -> Client:
     from distributed import Client
 
     came: queue.SimpleQueue[Client | Exception] = queue.SimpleQueue()
@@ -155,20 +155,20 @@ def _connected(address: str, security: Any) -> Client:
         else:
             came.put(client)
 
-    # Dask bounds the wait for a connection, but not that for the first answer. So it waits in a
-    # thread, which is left to itself where no answer comes, and does not keep the program.
+    # Dask limits the wait for a connection, but not for the first answer. So this waits in a daemon
+    # thread, which is abandoned if no answer comes.
     limit = _CONNECT_S
     threading.Thread(target=connect, daemon=True).start()
     try:
-        found = came.get(timeout=limit + _GRACE_S)
+        found = came.get(timeout=limit + _EXTRA_S)
     except queue.Empty:
         raise DynrespError(
-            f"--scheduler: what listens at {address!r} has not answered as a Dask scheduler does "
-            f"within {limit:g} s; see whether the address is right, and the scheduler is alive"
+            f"--scheduler: no Dask scheduler has answered at {address!r} within {limit:g} s; "
+            "check the address, and that the scheduler runs"
         ) from None
     if isinstance(found, (OSError, ValueError, TypeError, RuntimeError)):
         raise DynrespError(
-            f"--scheduler: no Dask scheduler can be reached at {address!r} ({_short(found)}); "
+            f"--scheduler: no Dask scheduler can be reached at {address!r} ({_error_text(found)}); "
             "start one with `dask scheduler`, and see docs/datasets.md for TLS"
         )
     if isinstance(found, Exception):
@@ -176,50 +176,52 @@ def _connected(address: str, security: Any) -> Client:
     return found
 
 
-def _await_workers(client: Client, address: str, waiting: Callable[[], None]) -> None:
-    told = False
-    while not _threads(client, address):
-        if not told:
+def _wait_for_workers(client: Client, address: str, waiting: Callable[[], None]) -> None:
+    called = False
+    while not _cluster_threads(client, address):
+        if not called:
             waiting()
-            told = True
-        time.sleep(_LOOK_S)
+            called = True
+        time.sleep(_POLL_S)
 
 
-def _threads(client: Client, address: str) -> int:
-    """How many shards the cluster makes at once."""
+def _cluster_threads(client: Client, address: str) -> int:
+    """Threads of all workers: how many shards the cluster makes at once."""
     try:
         found: dict[str, int] = client.sync(client.scheduler.ncores, callback_timeout=_CONNECT_S)
     except Exception:
-        raise _gone(address) from None
+        raise _lost_connection(address) from None
     return sum(found.values())
 
 
-def _made(
-    client: Client, job: Job, wanted: Sequence[Place], address: str
-) -> Generator[tuple[Place, bytes], None, None]:
+def _shards_from_cluster(
+    client: Client, job: Job, wanted: Sequence[ShardRange], address: str
+) -> Generator[tuple[ShardRange, bytes], None, None]:
     from distributed import as_completed
 
     run = secrets.token_hex(4)
-    flying: dict[Any, Place] = {}
+    in_flight: dict[Any, ShardRange] = {}
     finished = as_completed(loop=client.loop)
     left = list(reversed(wanted))
-    while left or flying:
-        room = max(_LEAST, _AHEAD * _threads(client, address)) - len(flying)
+    while left or in_flight:
+        room = max(_MIN_IN_FLIGHT, _SHARDS_PER_THREAD * _cluster_threads(client, address)) - len(
+            in_flight
+        )
         for _ in range(min(room, len(left))):
-            place = left.pop()
-            key = f"dynresp-{run}-{place.name}"
+            shard = left.pop()
+            key = f"dynresp-{run}-{shard.name}"
             # Earlier shards first, wherever they are.
             future = client.submit(
-                make_on_worker, job, place, key=key, pure=False, priority=-place.number
+                make_on_worker, job, shard, key=key, pure=False, priority=-shard.number
             )
-            flying[future] = place
+            in_flight[future] = shard
             finished.add(future)
         future = next(finished)
-        place = flying.pop(future)
-        yield place, _result(future, place, address)
+        shard = in_flight.pop(future)
+        yield shard, _result(future, shard, address)
 
 
-def _result(future: Any, place: Place, address: str) -> bytes:
+def _result(future: Any, shard: ShardRange, address: str) -> bytes:
     from distributed import KilledWorker
 
     try:
@@ -228,54 +230,54 @@ def _result(future: Any, place: Place, address: str) -> bytes:
         raise
     except KilledWorker:
         raise DynrespError(
-            f"the workers that were to make shard {place.number} died, one after the other; look "
-            "into their logs (memory?). Nothing is lost: the same command goes on."
+            f"the workers that were to make shard {shard.number} died, one after the other; look "
+            "into their logs (memory?). Nothing is lost: the same command continues."
         ) from None
     except Exception as error:
         if future.status == "error":
             raise DynrespError(
-                f"a worker failed on shard {place.number}: {_short(error)}; the same version of "
-                "dynresp must be installed there"
+                f"a worker failed on shard {shard.number}: {_error_text(error)}; the same version "
+                "of dynresp must be installed there"
             ) from None
-        raise _gone(address) from None
+        raise _lost_connection(address) from None
     if not isinstance(data, bytes):
-        raise DynrespError(f"a worker gave a {type(data).__name__} as shard {place.number}")
+        raise DynrespError(f"a worker gave a {type(data).__name__} as shard {shard.number}")
     return data
 
 
-def make_on_worker(job: Job, place: Place) -> bytes:
-    """Make one shard; what a Dask worker runs.
+def make_on_worker(job: Job, shard: ShardRange) -> bytes:
+    """Make one shard; a Dask worker runs this.
 
     Raises:
         DynrespError: It could not be done there.
     """
     try:
-        return _workshop(job).make(place)
+        return _loaded_worker(job).make(shard)
     except DynrespError as error:
         from distributed import get_worker
 
-        # The root of the tree, since others may not survive the way back.
+        # The base class: others may not survive pickling.
         raise DynrespError(f"worker {get_worker().address}: {error}") from None
 
 
-def _workshop(job: Job) -> Workshop:
-    key = (job.manifest["identity"], job.beside, job.motions)
-    if getattr(_own, "key", None) != key:
-        # A folder that is on this machine, or else what the machine itself is told.
+def _loaded_worker(job: Job) -> SampleWorker:
+    key = (job.manifest["identity"], job.spec_folder, job.motions)
+    if getattr(_thread_state, "key", None) != key:
+        # The folder of the job if it exists here, else this machine's own DYNRESP_MOTIONS.
         here = job.motions is not None and job.motions.is_dir()
-        _own.workshop = load(job if here else replace(job, motions=None))
-        _own.key = key
-    workshop: Workshop = _own.workshop
-    return workshop
+        _thread_state.worker = load_worker(job if here else replace(job, motions=None))
+        _thread_state.key = key
+    sample_worker: SampleWorker = _thread_state.worker
+    return sample_worker
 
 
-def _gone(address: str) -> DynrespError:
+def _lost_connection(address: str) -> DynrespError:
     return DynrespError(
-        f"the connection to the Dask scheduler at {address!r} is lost. What is made is kept: when "
-        "the scheduler runs again, the same command goes on."
+        f"the connection to the Dask scheduler at {address!r} is lost. Finished shards are kept: "
+        "when the scheduler runs again, the same command continues."
     )
 
 
-def _short(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__

@@ -1,4 +1,4 @@
-"""Reading a dataset that `dynresp generate` has written."""
+"""Read a dataset that `dynresp generate` has written."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from dynresp.datasets.manifest_reader import HIT, Facts, parse_facts, read_manifest
 from dynresp.datasets.shard_schema import PARAMETERS, Columns
-from dynresp.datasets.shards import Place, ShardError, places, read_shard
+from dynresp.datasets.shards import ShardError, ShardRange, read_shard, shard_ranges
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import DynrespError, UsageError
 
@@ -21,13 +21,13 @@ _THREADS = 4
 
 @dataclass(frozen=True)
 class Dataset:
-    """Samples, arrays over n of them; read-only. What was not hit has NaN, and -1 for an index.
+    """Samples, as read-only arrays of length n. A miss has NaN, and -1 for an index.
 
     Attributes:
         facts: What the manifest says: names, identities, settings.
-        index: (n,) the sample's place in the dataset.
+        index: (n,) the sample's number in the dataset.
         base: (n,) which base motion was hit, in `facts.bases`.
-        impact: (n,) which `[[impact]]` of the plan it was drawn from.
+        impact: (n,) which `[[impact]]` of the spec it was drawn from.
         kind: (n,) in `facts.kinds`.
         target: (n,) the body aimed at, in `facts.bodies`.
         parameters: By name, such as "speed_m_s", (n,) numbers of the impact in the units of their
@@ -40,10 +40,10 @@ class Dataset:
         contact_force: (n,) [N].
         contact_point: (n, 3) world [m].
         graze: (n,) whether the hit was too light for a reaction.
-        speed_change: (n,) what it did to the speed of the centre of mass over the ground [m/s].
-        label: (n,) class that the oracle chose, in `facts.classes`.
-        errors: (n, classes) least window error of each class [m].
-        exit_frames: (n, classes) where it is reached, frames after contact.
+        speed_change: (n,) change of the horizontal speed of the centre of mass [m/s].
+        label: (n,) class that the full search chose, in `facts.classes`.
+        errors: (n, classes) least mismatch (window error) of each class [m].
+        exit_frames: (n, classes) exit with that mismatch, frames after contact.
         entry_frames: (n, classes) frame of the reaction's clip; of the base motion, after contact.
         features: (n, features) in the order of `facts.feature_names`.
     """
@@ -82,7 +82,7 @@ class Dataset:
         """Some of the samples.
 
         Args:
-            rows: Which, as an index of NumPy: places, a mask, or a slice.
+            rows: Which, as an index of NumPy: row numbers, a mask, or a slice.
         """
         taken = {name: array[rows] for name, array in self._arrays().items()}
         parameters = {name: array[rows] for name, array in self.parameters.items()}
@@ -100,12 +100,13 @@ def load_dataset(
 
     Args:
         folder: Of the dataset.
-        hits_only: Leave out the samples in which nothing was hit, or that diverged.
-        limit: Read the first so many samples only, misses counted.
+        hits_only: Leave out misses and simulations that diverged.
+        limit: Read only the first samples, this many, misses included.
 
     Raises:
-        UsageError: It is no dataset, one of another schema version, or the limit is below 1.
-        DynrespError: It is not complete, or a file is damaged; the message names the file.
+        UsageError: The folder holds no dataset, or one of another schema version; or the limit is
+            below 1.
+        DynrespError: A file is missing or damaged; the message names it.
     """
     folder = Path(folder)
     facts = parse_facts(read_manifest(folder), str(folder))
@@ -113,19 +114,21 @@ def load_dataset(
         raise UsageError(f"limit: expected at least 1 sample, got {limit}")
     count = facts.count if limit is None else min(limit, facts.count)
     hit = facts.outcomes.index(HIT)
-    wanted = [p for p in places(facts.identity, facts.count, facts.shard_size) if p.first < count]
+    wanted = [
+        p for p in shard_ranges(facts.identity, facts.count, facts.shard_size) if p.first < count
+    ]
 
-    def part_of(place: Place) -> Columns:
-        part = _read(folder, facts, place)
+    def part_of(shard: ShardRange) -> Columns:
+        part = _read(folder, facts, shard)
         keep = part["index"] < count
         if hits_only:
             keep &= part["outcome"] == hit
         return part if keep.all() else {name: part[name][keep] for name in part}
 
-    # Unpacking and hashing leave Python's lock alone.
+    # Decoding and hashing release the GIL.
     with ThreadPoolExecutor(_THREADS) as pool:
         parts = list(pool.map(part_of, wanted))
-    # Each part goes as it is copied, so that memory holds little twice.
+    # Each part is dropped once it is copied, to save memory.
     joined = {
         column.name: np.concatenate([p.pop(column.name) for p in parts]) for column in facts.layout
     }
@@ -133,13 +136,13 @@ def load_dataset(
     return Dataset(facts=facts, parameters=parameters, **joined)
 
 
-def _read(folder: Path, facts: Facts, place: Place) -> Columns:
+def _read(folder: Path, facts: Facts, shard: ShardRange) -> Columns:
     try:
-        part = read_shard(folder, facts.layout, place)
-        facts.check(part, str(folder / place.name))
+        part = read_shard(folder, facts.layout, shard)
+        facts.check(part, str(folder / shard.name))
     except ShardError as error:
         raise DynrespError(
-            f"{error}; the `dynresp generate` that made the dataset makes what is missing or "
-            "damaged again"
+            f"{error}; run the `dynresp generate` command that made the dataset again: it makes "
+            "missing and damaged shards"
         ) from None
     return part

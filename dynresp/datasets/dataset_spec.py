@@ -1,4 +1,4 @@
-"""What a plan of training data may say. `docs/datasets.md` explains it to those who write one."""
+"""What a dataset spec may say, as pydantic models. `docs/datasets.md` explains it to users."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ MAX_COUNT = 10_000_000
 """Most samples of one dataset."""
 
 MAX_TABLES = 100
-"""Most base motions, and most impacts, of one plan."""
+"""Most base motions, and most impacts, of one spec."""
 
 KINDS = ("ball", "punch", "push")
-"""Kinds of impacts that a plan can draw."""
+"""Kinds of impacts that a spec can draw."""
 
 HIT = "hit"
-"""Under this name the keys that an impact shares with an experiment's stand in the model."""
+"""The field of `ImpactTable` that holds the keys which an experiment's impact has, too."""
 
 # A list of tables: at least one, and not too many.
 _TABLES = Field(strict=False, min_length=1, max_length=MAX_TABLES)
@@ -37,7 +37,7 @@ class PlanTable(Strict):
     count: Annotated[int, whole(1, MAX_COUNT)]
 
 
-class PlannedBase(BaseMotion):
+class BaseTable(BaseMotion):
     """One `[[base]]`: a motion that the character may be playing."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)] | None = None
@@ -49,13 +49,13 @@ class PlannedBase(BaseMotion):
         return self.name or self.motion
 
 
-class PlannedImpact(Strict):
+class ImpactTable(Strict):
     """One `[[impact]]`: a distribution of hits.
 
     Attributes:
-        phase: When it comes, as a share of the time at which it can.
+        phase: When it comes, as a share of the times at which it can come.
         weight: How often, beside the other impacts.
-        hit: Everything else, as in an experiment; its `time_s` means nothing here.
+        hit: Everything else, as in an experiment; its `time_s` is not used.
     """
 
     phase: Annotated[Number, number(0.0, 1.0, "(a share)")] = Uniform(0.0, 1.0)
@@ -65,40 +65,40 @@ class PlannedImpact(Strict):
     @model_validator(mode="before")
     @classmethod
     def _split(cls, given: Any) -> Any:
-        """Tell the plan's own keys from those that an experiment's impact has, too."""
+        """Separate the keys of a dataset spec from those that an experiment's impact has, too."""
         if not isinstance(given, dict):
             return given
         if "time_s" in given:
             raise ValueError(
-                f"a plan has no time_s, got {shown(given['time_s'])}; say with phase, from 0 to 1, "
-                "when in the base motion it hits"
+                f"a dataset spec has no time_s, got {shown(given['time_s'])}; give phase, from 0 "
+                "to 1: when in the base motion it hits"
             )
         own = {key: given[key] for key in ("phase", "weight") if key in given}
         rest = {key: value for key, value in given.items() if key not in own}
         return {**own, HIT: {**rest, "time_s": 0.0}}
 
 
-class DatasetPlan(Strict):
-    """A whole plan file."""
+class DatasetSpec(Strict):
+    """A whole spec file."""
 
     plan: PlanTable
-    base: Annotated[tuple[PlannedBase, ...], _TABLES]
-    impact: Annotated[tuple[PlannedImpact, ...], _TABLES]
+    base: Annotated[tuple[BaseTable, ...], _TABLES]
+    impact: Annotated[tuple[ImpactTable, ...], _TABLES]
     library: LibraryTable = LibraryTable()
     settings: SettingsTable = SettingsTable()
 
     @model_validator(mode="after")
-    def _names_differ(self) -> DatasetPlan:
+    def _names_differ(self) -> DatasetSpec:
         names = [base.title for base in self.base]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(
-                f"two [[base]] tables are called {twice[0]!r}; give each a name of its own"
+                f"two [[base]] tables have the name {twice[0]!r}; give each its own name"
             )
         return self
 
-    def changed(self, count: int | None, seed: int | None) -> DatasetPlan:
-        """The same plan with the count and the seed of the command line, where there are any."""
+    def changed(self, count: int | None, seed: int | None) -> DatasetSpec:
+        """The same spec with another count and seed, where they are not None."""
         table = self.plan.model_copy(
             update={
                 "count": self.plan.count if count is None else count,
@@ -108,9 +108,9 @@ class DatasetPlan(Strict):
         return self.model_copy(update={"plan": table})
 
 
-def plain(plan: DatasetPlan) -> dict[str, Any]:
-    """A plan with its defaults filled in, but for those that are none, as a manifest holds it."""
-    content: dict[str, Any] = _plain(plan)
+def plain(spec: DatasetSpec) -> dict[str, Any]:
+    """A spec with its defaults filled in, without values that are None, as a manifest holds it."""
+    content: dict[str, Any] = _plain(spec)
     for impact in content["impact"]:
         impact.update(impact.pop(HIT))
         del impact["time_s"]

@@ -1,11 +1,11 @@
-"""Reading a plan file, and saying in words what is wrong with it."""
+"""Read a dataset spec from a TOML file and check it."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from dynresp.datasets.dataset_spec import HIT, DatasetPlan
+from dynresp.datasets.dataset_spec import HIT, DatasetSpec
 from dynresp.specs.toml_errors import Hints, read_spec, validate
 
 _HINTS = Hints(
@@ -13,8 +13,8 @@ _HINTS = Hints(
         "plan": "add [plan] with name and count",
         "base": 'add [[base]] with motion = "builtin:walk" or another motion',
         "impact": "add [[impact]] with kind",
-        "name": "say in a few words what the samples are",
-        "count": "say how many samples there shall be",
+        "name": "describe the samples in a few words",
+        "count": "give the number of samples",
         "motion": 'give "builtin:walk", a path inside a motions folder, or a file',
     },
     inner=HIT,
@@ -22,8 +22,8 @@ _HINTS = Hints(
 )
 
 
-def read_plan(path: Path | str) -> DatasetPlan:
-    """Read a plan file.
+def read_dataset_spec(path: Path | str) -> DatasetSpec:
+    """Read a dataset spec.
 
     Args:
         path: A TOML file.
@@ -35,11 +35,11 @@ def read_plan(path: Path | str) -> DatasetPlan:
         SpecError: It cannot be read, is too large or not TOML, or says something that is not
             allowed. The message names the file, the key, what was given and what is allowed.
     """
-    return read_spec(DatasetPlan, Path(path), "a plan file", _HINTS)
+    return read_spec(DatasetSpec, Path(path), "a dataset spec", _HINTS)
 
 
-def parse_plan(content: dict[str, Any], source: str = "plan") -> DatasetPlan:
-    """Check the content of a plan file.
+def parse_dataset_spec(content: dict[str, Any], source: str = "dataset spec") -> DatasetSpec:
+    """Check the content of a dataset spec.
 
     Args:
         content: What the file says, as `tomllib` gives it.
@@ -48,4 +48,4 @@ def parse_plan(content: dict[str, Any], source: str = "plan") -> DatasetPlan:
     Raises:
         SpecError: It says something that is not allowed.
     """
-    return validate(DatasetPlan, content, source, _HINTS)
+    return validate(DatasetSpec, content, source, _HINTS)

@@ -1,4 +1,4 @@
-"""Making a dataset: into a new folder, or going on in one that has been begun."""
+"""Make a dataset in a new folder, or continue one that was interrupted."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.dataset_spec import DatasetPlan
-from dynresp.datasets.local_workers import cores, make_here
-from dynresp.datasets.manifest import MANIFEST, differences, told, write_manifest
+from dynresp.datasets.dataset_spec import DatasetSpec
+from dynresp.datasets.local_workers import cores, make_locally
+from dynresp.datasets.manifest import MANIFEST, differences, differences_text, write_manifest
 from dynresp.datasets.manifest_reader import (
     MAX_SHARD_SIZE,
     Facts,
@@ -23,18 +23,18 @@ from dynresp.datasets.manifest_reader import (
     parse_facts,
     read_manifest,
 )
-from dynresp.datasets.sample_worker import Job, Workshop
+from dynresp.datasets.sample_worker import Job, SampleWorker
 from dynresp.datasets.shard_schema import Columns
 from dynresp.datasets.shards import (
-    ForeignShardError,
-    Place,
+    OtherDatasetError,
     ShardError,
+    ShardRange,
     decode,
-    left_over,
-    places,
+    leftover_files,
     read_shard,
     shard_files,
-    stated,
+    shard_ranges,
+    stated_ranges,
 )
 from dynresp.support.errors import DynrespError, UsageError
 from dynresp.support.extras import require
@@ -43,22 +43,22 @@ from dynresp.support.paths import expanded
 from dynresp.support.progress import Progress
 
 SHARD_SIZE = 500
-"""Samples of a shard where nothing else is said: about ten seconds of one core."""
+"""Samples of a shard by default: about ten seconds of work for one core."""
 
 
 @dataclass
 class Summary:
-    """What a run has come to.
+    """What a run has made.
 
     Attributes:
         folder: The dataset's folder.
         samples: In the dataset.
         outcomes: How many samples have which outcome.
         shards: In the dataset.
-        made: Shards that this run has made where there was none.
-        remade: Shards that it has made in place of one that was damaged or too short.
+        made: Shards that were missing and that this run has made.
+        remade: Damaged or too short shards that this run has replaced.
         samples_made: Samples in these.
-        seconds: How long that took, with the starting of workers [s].
+        seconds: How long that took, including the start of the workers [s].
     """
 
     folder: Path
@@ -89,8 +89,8 @@ class Summary:
 
 
 def generate(
-    plan: DatasetPlan,
-    beside: Path,
+    spec: DatasetSpec,
+    spec_folder: Path,
     out: Path,
     motions: Path | None = None,
     workers: int | None = None,
@@ -99,26 +99,26 @@ def generate(
     tell: Progress | None = None,
     loaded: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> Summary:
-    """Make a dataset, or what is still missing of it.
+    """Make a dataset, or the missing part of it.
 
-    The samples depend on the plan alone: not on the workers, nor on how often it was interrupted.
+    The samples depend only on the spec, not on the workers or on interruptions.
 
     Args:
-        plan: The plan.
-        beside: Folder of the plan file, from which relative paths count.
+        spec: What the samples are drawn from.
+        spec_folder: Folder of the spec file, from which relative paths count.
         out: Folder of the dataset; made if it is missing.
-        motions: Motions folder that the user named.
-        workers: Processes on this machine, by default one for each core.
-        scheduler: Address of a Dask scheduler whose workers do it instead.
+        motions: Motions folder that the user gave.
+        workers: Processes on this machine; by default one per core.
+        scheduler: Address of a Dask scheduler; its workers do the work instead.
         shard_size: Samples of a shard; by default what the folder has, else `SHARD_SIZE`.
-        tell: Told how it goes on.
-        loaded: Told the manifest, before anything is made.
+        tell: Progress: stage, samples done, samples in all.
+        loaded: Called with the manifest before any sample is made.
 
     Raises:
-        UsageError: The folder holds another dataset, more samples than asked for, or cannot be
+        UsageError: The folder holds another dataset or more samples than the spec, or cannot be
             written; or the scheduler's address or certificates are wrong.
         MissingExtraError: PyArrow is not installed.
-        DynrespError: It could not be done. What has been made stays, and is gone on with.
+        DynrespError: It could not be done. Finished shards stay; the next run continues.
     """
     tell = tell or (lambda stage, done, of: None)
     require("pyarrow")
@@ -128,9 +128,9 @@ def generate(
         # Refused before motions are loaded, which takes a while.
         connection_security(scheduler)
     with _locked(out):
-        tell("loading motions", 0, plan.plan.count)
-        workshop = Workshop(plan, beside.resolve(), motions)
-        manifest = workshop.manifest(_shard_size(out, shard_size, workshop))
+        tell("loading motions", 0, spec.plan.count)
+        worker = SampleWorker(spec, spec_folder.resolve(), motions)
+        manifest = worker.manifest(_shard_size(out, shard_size, worker))
         there = _checked(out, manifest)
         if loaded is not None:
             loaded(manifest)
@@ -139,14 +139,14 @@ def generate(
         if there is None:
             _refuse_fewer(out, facts)
         wanted = _wanted(out, facts, summary, tell, known=there is not None)
-        for path in left_over(out):
+        for path in leftover_files(out):
             path.unlink(missing_ok=True)
-        # First of all, so that whatever is made is known to belong to it.
+        # Written before the shards, so that each of them belongs to a known dataset.
         if there != manifest:
             write_manifest(manifest, out)
         named = None if motions is None else expanded(motions, "--motions").resolve()
-        job = Job(plan, beside.resolve(), named, manifest)
-        del workshop
+        job = Job(spec, spec_folder.resolve(), named, manifest)
+        del worker
         _make(job, facts, wanted, out, workers, scheduler, summary, tell)
     return summary
 
@@ -154,14 +154,14 @@ def generate(
 def _make(
     job: Job,
     facts: Facts,
-    wanted: Mapping[Place, bool],
+    wanted: Mapping[ShardRange, bool],
     out: Path,
     workers: int | None,
     scheduler: str | None,
     summary: Summary,
     tell: Progress,
 ) -> None:
-    """Make shards, and write each as soon as it is there."""
+    """Make shards, and write each as soon as it is finished."""
     if not wanted:
         return
     begun = time.perf_counter()
@@ -174,26 +174,26 @@ def _make(
     with ExitStack() as stack:
         if scheduler is None:
             tell("starting workers", kept, facts.count)
-            made = make_here(job, list(wanted), workers or cores(), partly)
+            made = make_locally(job, list(wanted), workers or cores(), partly)
         else:
-            from dynresp.datasets.dask_workers import make_there
+            from dynresp.datasets.dask_workers import make_on_cluster
 
             tell("looking for the scheduler", kept, facts.count)
 
             def waiting() -> None:
                 tell("waiting for workers", kept, facts.count)
 
-            made = make_there(job, list(wanted), scheduler, waiting)
+            made = make_on_cluster(job, list(wanted), scheduler, waiting)
         stack.enter_context(closing(made))
-        for place, data in made:
-            source = f"shard {place.number}, as it was made"
-            columns = decode(data, facts.layout, place, source)
+        for shard, data in made:
+            source = f"shard {shard.number}, as it was made"
+            columns = decode(data, facts.layout, shard, source)
             facts.check(columns, source)
-            with replacing(out / place.name) as temporary:
+            with replacing(out / shard.name) as temporary:
                 temporary.write_bytes(data)
             _count(columns, facts, summary)
-            summary.samples_made += place.rows
-            if wanted[place]:
+            summary.samples_made += shard.rows
+            if wanted[shard]:
                 summary.remade += 1
             else:
                 summary.made += 1
@@ -203,37 +203,42 @@ def _make(
 
 def _wanted(
     out: Path, facts: Facts, summary: Summary, tell: Progress, known: bool
-) -> dict[Place, bool]:
-    """The shards that must be made, and whether each takes the place of a bad one.
+) -> dict[ShardRange, bool]:
+    """The shards that must be made, and whether each replaces a bad one.
 
-    Where it is known from its manifest that the folder is this dataset's, a shard of another one
-    is a bad one, too.
+    Args:
+        out: Folder of the dataset.
+        facts: What its manifest says.
+        summary: Counts the good shards.
+        tell: Progress.
+        known: Whether the folder's manifest says that it holds this dataset; then a shard of
+            another dataset is a bad one, too.
     """
     wanted = {}
     there = shard_files(out)
-    all_places = places(facts.identity, facts.count, facts.shard_size)
-    beyond = [path.name for number, path in sorted(there.items()) if number >= len(all_places)]
+    ranges = shard_ranges(facts.identity, facts.count, facts.shard_size)
+    beyond = [path.name for number, path in sorted(there.items()) if number >= len(ranges)]
     if beyond:
         raise UsageError(
-            f"{out} holds more than the {facts.count} samples that were asked for ({beyond[0]}); "
-            "ask for as many as it has, or name another folder"
+            f"{out} holds more than {facts.count} samples ({beyond[0]}); give a larger --count, or "
+            "another folder"
         )
-    for place in all_places:
-        if place.number not in there:
-            wanted[place] = False
+    for shard in ranges:
+        if shard.number not in there:
+            wanted[shard] = False
             continue
-        tell("checking what is there", place.first, facts.count)
+        tell("checking what is there", shard.first, facts.count)
         try:
-            columns = read_shard(out, facts.layout, place)
-            facts.check(columns, place.name)
+            columns = read_shard(out, facts.layout, shard)
+            facts.check(columns, shard.name)
             _count(columns, facts, summary)
         except ShardError as error:
-            if isinstance(error, ForeignShardError) and not known:
+            if isinstance(error, OtherDatasetError) and not known:
                 raise UsageError(
-                    f"{error}; name another folder, give the --shard-size that it was made with, "
+                    f"{error}; give another folder, or the --shard-size that it was made with, "
                     "or remove its shards"
                 ) from None
-            wanted[place] = True
+            wanted[shard] = True
     return wanted
 
 
@@ -245,69 +250,70 @@ def _count(columns: Columns, facts: Facts, summary: Summary) -> None:
 
 
 def _refuse_fewer(out: Path, facts: Facts) -> None:
-    """Refuse fewer samples than there are where no manifest says how many: the shards do."""
-    most = max((p.first + p.rows for p in stated(out) if p.identity == facts.identity), default=0)
+    """Refuse fewer samples than the shards hold, where there is no manifest."""
+    most = max(
+        (p.first + p.rows for p in stated_ranges(out) if p.identity == facts.identity), default=0
+    )
     if most > facts.count:
-        raise _fewer(out, most, facts.count, "at least ")
+        raise _too_few_error(out, most, facts.count, "at least ")
 
 
-def _fewer(out: Path, there: int, asked: int, how: str = "") -> UsageError:
+def _too_few_error(out: Path, there: int, wanted: int, how: str = "") -> UsageError:
     return UsageError(
-        f"{out} holds a dataset of {how}{there} samples, and {asked} were asked for; give --count "
-        f"{there} or more, or name another folder"
+        f"{out} holds a dataset of {how}{there} samples, more than the {wanted} to make; give "
+        f"--count {there} or more, or another folder"
     )
 
 
-def _shard_size(out: Path, asked: int | None, workshop: Workshop) -> int:
-    """The size that a begun dataset has, or the one that is asked for."""
-    if asked is not None:
-        return asked
+def _shard_size(out: Path, given: int | None, worker: SampleWorker) -> int:
+    """The given shard size, or else that of the dataset in the folder."""
+    if given is not None:
+        return given
     try:
         return int(read_manifest(out)["shard_size"])
     except (ManifestError, UsageError):
         pass
     tried = set()
-    for place in stated(out):
-        # Of the first shard alone it cannot be said whether it is full; the identity, in which
-        # the size is, decides.
-        sizes = (place.first // place.number,) if place.number else (SHARD_SIZE, place.rows)
+    for shard in stated_ranges(out):
+        # The first shard alone does not say whether it is full. The identity depends on the size.
+        sizes = (shard.first // shard.number,) if shard.number else (SHARD_SIZE, shard.rows)
         for size in sizes:
-            if not 1 <= size <= MAX_SHARD_SIZE or (place.identity, size) in tried:
+            if not 1 <= size <= MAX_SHARD_SIZE or (shard.identity, size) in tried:
                 continue
-            tried.add((place.identity, size))
-            if workshop.manifest(size)["identity"] == place.identity:
+            tried.add((shard.identity, size))
+            if worker.manifest(size)["identity"] == shard.identity:
                 return size
     return SHARD_SIZE
 
 
 def _checked(out: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The manifest that is there, if any; a folder with another dataset, or more, is refused."""
+    """The manifest in the folder, if any; another dataset, or a larger one, is refused."""
     if not (out / MANIFEST).exists():
         return None
     try:
         there = read_manifest(out)
     except ManifestError:
-        # The shards themselves say what they belong to; the manifest is written again.
+        # The shards themselves name their dataset; the manifest is written again.
         return None
     found = differences(there, manifest)
     if found:
         raise UsageError(
-            f"{out} holds another dataset; different are {told(found)}. Name another folder, or "
-            "give what it was made with."
+            f"{out} holds another dataset, with another {differences_text(found)}. Give another "
+            "folder, or the spec and options that it was made with."
         )
     if there["count"] > manifest["count"]:
-        raise _fewer(out, there["count"], manifest["count"])
+        raise _too_few_error(out, there["count"], manifest["count"])
     return there
 
 
 @contextmanager
 def _locked(out: Path) -> Iterator[None]:
-    """Make the folder, and keep others from writing to it at the same time.
+    """Make the folder, and lock it against other runs.
 
-    Folders that it has made go again where nothing was put into them.
+    Folders that it has made are removed again if they stay empty.
     """
     if out.exists() and not out.is_dir():
-        raise UsageError(f"--out: {str(out)!r} is a file; expected a folder for the dataset")
+        raise UsageError(f"--out: {str(out)!r} is a file; give a folder for the dataset")
     new = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         try:
@@ -316,7 +322,7 @@ def _locked(out: Path) -> Iterator[None]:
             raise UsageError(
                 f"--out: {str(out)!r} cannot be made ({error.strerror}); choose another folder"
             ) from None
-        with _alone(out):
+        with _exclusive(out):
             yield
     finally:
         with suppress(OSError):
@@ -325,13 +331,13 @@ def _locked(out: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _alone(out: Path) -> Iterator[None]:
+def _exclusive(out: Path) -> Iterator[None]:
     if not os.access(out, os.W_OK | os.X_OK):
         raise UsageError(f"--out: {str(out)!r} cannot be written; choose another folder")
     try:
         import fcntl
     except ImportError:
-        # A system without such locks: what two runs write is the same, and each file whole.
+        # A system without such locks: two runs write the same, and each file is whole.
         yield
         return
     handle = os.open(out, os.O_RDONLY)

@@ -1,7 +1,7 @@
-"""Workers on this machine: processes, one to a core.
+"""Workers on this machine: one process per core.
 
-Each is connected by a pipe of its own. When the program dies, in whatever way, its workers read
-the end of their pipes and end; when a worker dies, another takes its shard.
+Each has its own pipe. When the main program dies, its workers read the end of their pipes and end;
+when a worker dies, another worker makes its shard.
 """
 
 from __future__ import annotations
@@ -17,17 +17,18 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
-from dynresp.datasets.sample_worker import Job, load
-from dynresp.datasets.shards import Place
+from dynresp.datasets.sample_worker import Job, load_worker
+from dynresp.datasets.shards import ShardRange
 from dynresp.support.errors import DynrespError
 
 MAX_DEATHS = 3
-"""A shard that so many workers died of is given up."""
+"""How many workers may die while they make one shard."""
 
-MAX_FALSE_STARTS = 10
-"""As many workers, or three times the team, may die one after another before any has begun."""
+MAX_FAILED_STARTS = 10
+"""How many workers may die one after another before any begins with a shard; three times the number
+of workers where that is more."""
 
-# Libraries that would start threads of their own, and these would wait for each other.
+# Libraries that would start their own threads, which would compete for the cores.
 _ONE_THREAD = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -42,42 +43,42 @@ _STOP_S = 5.0
 class _Worker:
     process: SpawnProcess
     pipe: Connection
-    place: Place | None = None
+    shard: ShardRange | None = None
     begun: bool = False
     done: int = 0
 
 
 def cores() -> int:
-    """How many cores this program may use."""
+    """How many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def make_here(
-    job: Job, wanted: Sequence[Place], workers: int, progress: Callable[[int], None]
-) -> Generator[tuple[Place, bytes], None, None]:
-    """Make shards by processes of this machine.
+def make_locally(
+    job: Job, wanted: Sequence[ShardRange], workers: int, progress: Callable[[int], None]
+) -> Generator[tuple[ShardRange, bytes], None, None]:
+    """Make shards with processes on this machine.
 
     Args:
         job: The job.
         wanted: The shards.
         workers: How many processes.
-        progress: Told how many samples are done of shards that are not yet handed over.
+        progress: Called with the number of samples done in unfinished shards.
 
     Yields:
-        A shard and its Parquet file, in whatever order they are done.
+        Each shard with its Parquet file, in the order in which they are finished.
 
     Raises:
         DynrespError: A worker could not do it, or too many died.
     """
     waiting = deque(wanted)
     deaths: Counter[int] = Counter()
-    false_starts = 0
+    failed_starts = 0
     team: list[_Worker] = []
     left = len(wanted)
     try:
-        team = [_hired(job) for _ in range(min(workers, len(wanted)))]
+        team = [_start_worker(job) for _ in range(min(workers, len(wanted)))]
         for worker in team:
             _next(worker, waiting)
         while left:
@@ -87,91 +88,94 @@ def make_here(
                     kind, *content = worker.pipe.recv()
                 except (EOFError, OSError):
                     team.remove(worker)
-                    false_starts = 0 if worker.begun else false_starts + 1
-                    _mourn(worker, waiting, deaths, false_starts, workers)
+                    failed_starts = 0 if worker.begun else failed_starts + 1
+                    _requeue(worker, waiting, deaths, failed_starts, workers)
                     if waiting:
-                        team.append(_hired(job))
+                        team.append(_start_worker(job))
                         _next(team[-1], waiting)
                     continue
                 if kind == "error":
                     raise DynrespError(content[0])
                 if kind == "begun":
-                    worker.begun, false_starts = True, 0
+                    worker.begun, failed_starts = True, 0
                     continue
                 if kind == "done":
                     worker.done = content[0]
                     progress(sum(w.done for w in team))
                     continue
-                assert worker.place is not None
-                place, worker.done = worker.place, 0
+                assert worker.shard is not None
+                shard, worker.done = worker.shard, 0
                 _next(worker, waiting)
                 left -= 1
-                yield place, content[0]
+                yield shard, content[0]
     finally:
         for worker in team:
-            _dismissed(worker)
+            _stop_worker(worker)
 
 
-def _next(worker: _Worker, waiting: deque[Place]) -> None:
-    """Give a worker its next shard, where there is one."""
-    worker.place = waiting.popleft() if waiting else None
+def _next(worker: _Worker, waiting: deque[ShardRange]) -> None:
+    """Send a worker its next shard, if there is one."""
+    worker.shard = waiting.popleft() if waiting else None
     worker.begun = False
-    if worker.place is not None:
-        # One that has died is noticed where its pipe is read.
+    if worker.shard is not None:
+        # A dead worker is noticed when its pipe is read.
         with suppress(OSError):
-            worker.pipe.send(worker.place)
+            worker.pipe.send(worker.shard)
 
 
-def _mourn(
+def _requeue(
     worker: _Worker,
-    waiting: deque[Place],
+    waiting: deque[ShardRange],
     deaths: Counter[int],
-    false_starts: int,
+    failed_starts: int,
     workers: int,
 ) -> None:
-    """Put a dead worker's shard back, unless it has killed too many.
+    """Put a dead worker's shard back into the queue.
 
-    A worker that died before it began with its shard, while it loaded, did not die of it. Where
-    none gets further than that, something is wrong with all.
+    A worker that died while it loaded, before it began with its shard, does not count against the
+    shard.
+
+    Raises:
+        DynrespError: Too many workers died of this shard, or before any began.
     """
     worker.process.join(_STOP_S)
     code = worker.process.exitcode
-    _dismissed(worker)
-    place = worker.place
-    if place is None:
+    _stop_worker(worker)
+    shard = worker.shard
+    if shard is None:
         return
     how = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-    deaths[place.number] += worker.begun
-    if false_starts >= max(MAX_FALSE_STARTS, 3 * workers):
+    deaths[shard.number] += worker.begun
+    if failed_starts >= max(MAX_FAILED_STARTS, 3 * workers):
         raise DynrespError(
-            f"{false_starts} worker processes died one after another before they began ({how}); "
-            "see whether dynresp is wholly installed, and where memory is short, give fewer "
-            "--workers. Nothing is lost: the same command goes on."
+            f"{failed_starts} worker processes died one after another before they began ({how}); "
+            "check that dynresp is installed completely; if memory is short, give fewer "
+            "--workers. Nothing is lost: the same command continues."
         )
-    if deaths[place.number] >= MAX_DEATHS:
+    if deaths[shard.number] >= MAX_DEATHS:
         raise DynrespError(
-            f"{MAX_DEATHS} worker processes died while making shard {place.number} ({how}); where "
-            "memory is short, give fewer --workers. Nothing is lost: the same command goes on."
+            f"{MAX_DEATHS} worker processes died while making shard {shard.number} ({how}); if "
+            "memory is short, give fewer --workers. Nothing is lost: the same command continues."
         )
-    waiting.appendleft(place)
+    waiting.appendleft(shard)
 
 
-def _hired(job: Job) -> _Worker:
+def _start_worker(job: Job) -> _Worker:
     """Start a process."""
     context = multiprocessing.get_context("spawn")
     own, other = context.Pipe()
     process = context.Process(target=_work, args=(job, other), daemon=True)
-    with _as_a_worker_begins():
+    with _worker_environment():
         process.start()
     other.close()
     return _Worker(process, own)
 
 
 @contextmanager
-def _as_a_worker_begins() -> Iterator[None]:
-    """What a process inherits: one thread for each library, and no interruptions.
+def _worker_environment() -> Iterator[None]:
+    """What a worker inherits: one thread per library, and blocked interrupts.
 
-    Control-C in a terminal reaches all processes; only the first one is to act on it.
+    Control-C in a terminal reaches all processes; only the main program acts on it.
     """
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -190,7 +194,7 @@ def _as_a_worker_begins() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _dismissed(worker: _Worker) -> None:
+def _stop_worker(worker: _Worker) -> None:
     worker.pipe.close()
     worker.process.kill()
     worker.process.join(_STOP_S)
@@ -199,18 +203,18 @@ def _dismissed(worker: _Worker) -> None:
 
 
 def _work(job: Job, pipe: Connection) -> None:
-    """The whole life of a process."""
+    """What a worker process does: load the job, then make one shard after another."""
 
     def tell(*message: Any) -> None:
         pipe.send(message)
 
     try:
         try:
-            workshop = load(job)
+            sample_worker = load_worker(job)
             while True:
-                place: Place = pipe.recv()
+                shard: ShardRange = pipe.recv()
                 tell("begun")
-                tell("made", workshop.make(place, lambda done: tell("done", done)))
+                tell("made", sample_worker.make(shard, lambda done: tell("done", done)))
         except DynrespError as error:
             tell("error", str(error))
         except (EOFError, BrokenPipeError, ConnectionResetError):
@@ -218,5 +222,5 @@ def _work(job: Job, pipe: Connection) -> None:
         except Exception as error:
             tell("error", f"a worker failed: {type(error).__name__}: {error}")
     except (EOFError, OSError):
-        # The program that asked is gone.
+        # The main program has ended.
         return

@@ -1,4 +1,4 @@
-"""The manifest of a dataset: what it is made from, by what, and what its numbers mean."""
+"""The manifest of a dataset: spec, motions, settings, versions, and the names of its numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dynresp.datasets.dataset_spec import KINDS, DatasetPlan, plain
+from dynresp.datasets.dataset_spec import KINDS, DatasetSpec, plain
 from dynresp.datasets.shard_schema import PARAMETERS, SCHEMA_VERSION
 from dynresp.motion.character import Character
 from dynresp.motion.named_motion import NamedMotion
@@ -22,13 +22,13 @@ from dynresp.support.files import replacing
 
 MANIFEST = "manifest.json"
 FORMAT = "dynresp dataset"
-# What may differ between two runs into one folder.
-_FREE = ("count", "identity")
-_FREE_OF_PLAN = ("count", "name")
+# What may differ between two runs that write into the same folder.
+_IGNORED = ("count", "identity")
+_IGNORED_OF_PLAN = ("count", "name")
 
 
 def make_manifest(
-    plan: DatasetPlan,
+    spec: DatasetSpec,
     shard_size: int,
     character: Character,
     bases: Sequence[NamedMotion],
@@ -42,14 +42,14 @@ def make_manifest(
     content = {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
-        "count": plan.plan.count,
+        "count": spec.plan.count,
         "shard_size": shard_size,
-        "plan": plain(plan),
+        "plan": plain(spec),
         "bases": [
             {"name": base.title, **taken.record, **_motion(taken)}
-            for base, taken in zip(plan.base, bases, strict=True)
+            for base, taken in zip(spec.base, bases, strict=True)
         ],
-        "library": library_record(library, plan.library.which),
+        "library": library_record(library, spec.library.which),
         "character": {"identity": character.identity, "bodies": list(character.body_names)},
         "settings": settings_record(config),
         "classes": _classes(classes, library),
@@ -76,66 +76,66 @@ def _motion(taken: NamedMotion) -> dict[str, Any]:
 
 
 def _classes(classes: Sequence[str], library: ReactionLibrary) -> list[dict[str, str]]:
-    told = []
+    found = []
     for name in classes:
         if name == CARRY_ON:
-            told.append({"name": name, "strategy": CARRY_ON, "mirror": name})
+            found.append({"name": name, "strategy": CARRY_ON, "mirror": name})
             continue
         reaction = library.reaction(name)
         other = name.removesuffix(MIRRORED) if reaction.mirrored else name + MIRRORED
         mirror = other if other in classes else name
-        told.append({"name": name, "strategy": reaction.strategy, "mirror": mirror})
-    return told
+        found.append({"name": name, "strategy": reaction.strategy, "mirror": mirror})
+    return found
 
 
 def identity_of(content: Mapping[str, Any]) -> str:
-    """Hash of all that decides over the samples."""
-    decisive = json.dumps(_decisive(content), sort_keys=True, allow_nan=False)
-    return hashlib.sha256(decisive.encode()).hexdigest()[:32]
+    """Hash of everything that the samples depend on."""
+    identifying = json.dumps(_identifying(content), sort_keys=True, allow_nan=False)
+    return hashlib.sha256(identifying.encode()).hexdigest()[:32]
 
 
-def _decisive(content: Mapping[str, Any]) -> dict[str, Any]:
-    kept = {key: value for key, value in content.items() if key not in _FREE}
+def _identifying(content: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {key: value for key, value in content.items() if key not in _IGNORED}
     kept["plan"] = dict(kept["plan"])
     kept["plan"]["plan"] = {
-        key: value for key, value in kept["plan"]["plan"].items() if key not in _FREE_OF_PLAN
+        key: value for key, value in kept["plan"]["plan"].items() if key not in _IGNORED_OF_PLAN
     }
     return kept
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
-    """Which entries of two manifests differ, of those that decide over the samples.
+    """Which entries of two manifests differ, of those that the samples depend on.
 
     Returns:
-        Places such as "plan.plan.seed" or "library.identity", in the order of the manifest.
+        Keys such as "plan.plan.seed" or "library.identity", in the order of the manifest.
     """
-    return _differing(_decisive(one), _decisive(other), "")
+    return _differing(_identifying(one), _identifying(other), "")
 
 
-def _differing(one: Any, other: Any, place: str) -> list[str]:
+def _differing(one: Any, other: Any, path: str) -> list[str]:
     if isinstance(one, dict) and isinstance(other, dict):
         keys = [*one, *(key for key in other if key not in one)]
         inner = [
-            _differing(one.get(key), other.get(key), f"{place}.{key}" if place else str(key))
+            _differing(one.get(key), other.get(key), f"{path}.{key}" if path else str(key))
             for key in keys
         ]
         return [found for part in inner for found in part]
     if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         inner = [
-            _differing(a, b, f"{place} {i + 1}")
+            _differing(a, b, f"{path} {i + 1}")
             for i, (a, b) in enumerate(zip(one, other, strict=True))
         ]
         return [found for part in inner for found in part]
-    return [] if one == other else [place]
+    return [] if one == other else [path]
 
 
-def told(found: Sequence[str]) -> str:
-    """Differences in words, the first few of them."""
+def differences_text(found: Sequence[str]) -> str:
+    """The first four differences, and how many more there are."""
     return ", ".join(found[:4]) + (f" and {len(found) - 4} more" if len(found) > 4 else "")
 
 
 def write_manifest(content: Mapping[str, Any], folder: Path) -> None:
-    """Write the manifest, whole or not at all.
+    """Write the manifest; an interrupted write leaves the old one.
 
     Raises:
         DynrespError: It cannot be written.

@@ -1,4 +1,4 @@
-"""Reading a manifest: the names behind a dataset's numbers, checked."""
+"""Read and check a manifest: the names behind a dataset's numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_SHARD_SIZE = 100_000
 """Most samples of one shard."""
 
 HIT = "hit"
-"""The outcome of a sample that has features and a label."""
+"""The outcome of samples with features and a label."""
 
 _MAX_BYTES = 64 << 20
 _MAX_TEXT = 10_000
@@ -35,27 +35,27 @@ class Facts:
     """What a manifest says, checked.
 
     Attributes:
-        identity: Hash of all that decides over the samples; shards bear it, too.
+        identity: Hash of everything that the samples depend on; shards have it, too.
         schema_version: Of the columns.
         count: How many samples the dataset has when it is complete.
         shard_size: How many samples a shard has; the last may have fewer.
-        seed: Seed of the plan.
-        bases: Names of the base motions, in the order of the plan.
+        seed: Seed of the spec.
+        bases: Names of the base motions, in the order of the spec.
         kinds: Kinds of impacts; `kind` counts in them.
         bodies: The character's bodies; `target` and `contact_body` count in them.
-        outcomes: What can come of a hit; `outcome` counts in them.
+        outcomes: Possible outcomes of a hit; `outcome` counts in them.
         classes: The reactions of the library, then `carry_on`; `label` counts in them.
         strategies: Of each class; that of `carry_on` is `carry_on`.
-        mirrors: For each class the class that is its mirror image, as a place in `classes`; itself
-            where there is none.
+        mirrors: For each class the index of its mirror image in `classes`; its own where it has
+            none.
         feature_names: Of each feature.
         library: Name of the reaction library.
         library_identity: Its hash.
         character_identity: The character's hash.
         fps: Frames a second, in which frames count [1/s].
-        settings: Settings of physics and search that were in force.
-        versions: Of the programs that computed it.
-        plan: The plan, with every default filled in.
+        settings: Settings of physics and search.
+        versions: Of dynresp and the libraries that computed it.
+        spec: The spec, with every default filled in.
     """
 
     identity: str
@@ -77,21 +77,21 @@ class Facts:
     fps: float
     settings: Mapping[str, Any]
     versions: Mapping[str, str]
-    plan: Mapping[str, Any]
+    spec: Mapping[str, Any]
 
     @property
     def origin(self) -> str:
         """Hash of what the samples are drawn from.
 
-        The same for datasets that differ in names, settings, shard size, number of samples or
-        versions of the programs, whose samples of one index are the same hit.
+        Datasets with the same origin have the same hit at each index. They may differ in names,
+        settings, shard size, number of samples and versions.
         """
-        plan = self.plan
+        spec = self.spec
         bases = [
             {key: value for key, value in base.items() if key != "name"}
-            for base in plan.get("base", [])
+            for base in spec.get("base", [])
         ]
-        drawn = (self.seed, bases, plan.get("impact", []), self.character_identity)
+        drawn = (self.seed, bases, spec.get("impact", []), self.character_identity)
         return hashlib.sha256(json.dumps(drawn, sort_keys=True).encode()).hexdigest()[:32]
 
     @property
@@ -100,7 +100,7 @@ class Facts:
         return columns(len(self.feature_names), len(self.classes))
 
     def check(self, found: Columns, source: str) -> None:
-        """Refuse a shard whose indices lead nowhere.
+        """Refuse a shard with indices out of range.
 
         Args:
             found: Its contents.
@@ -121,15 +121,15 @@ class Facts:
             least = -1 if column in ("contact_body", "label") else 0
             numbers = found[column]
             if len(numbers) and not (least <= numbers.min() and numbers.max() < len(known)):
-                raise ShardError(f"{source}: damaged ({column} has a number that stands for none)")
+                raise ShardError(f"{source}: damaged ({column} has an index out of range)")
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read a manifest and check that it is one.
 
     Raises:
-        UsageError: There is none: this is no dataset; or one of another version of dynresp.
-        ManifestError: It is damaged, or what it says is out of bounds.
+        UsageError: The folder holds no dataset, or one of another schema version.
+        ManifestError: It is damaged, or a value is out of bounds.
     """
     path = folder / MANIFEST
     try:
@@ -147,7 +147,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         content = json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError):
-        raise ManifestError(f"{path}: damaged (no JSON)") from None
+        raise ManifestError(f"{path}: damaged (not JSON)") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ManifestError(f"{path}: damaged (it does not say that it is a {FORMAT})")
     version = content.get("schema_version")
@@ -161,20 +161,20 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def parse_facts(content: Mapping[str, Any], source: str = MANIFEST) -> Facts:
-    """What a manifest says.
+    """Check the content of a manifest.
 
     Raises:
         ManifestError: Something is missing, of a wrong type, or out of bounds.
     """
     try:
-        return _Checked(content).facts()
+        return _ManifestParser(content).facts()
     except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise ManifestError(f"{source}: damaged ({why})") from None
 
 
-class _Checked:
-    """Takes what a manifest says, or raises ValueError."""
+class _ManifestParser:
+    """Makes `Facts` from the content of a manifest, or raises ValueError."""
 
     def __init__(self, content: Mapping[str, Any]) -> None:
         self.content = content
@@ -182,7 +182,7 @@ class _Checked:
     def facts(self) -> Facts:
         content = self.content
         if content["identity"] != identity_of(content):
-            raise ValueError("its contents do not have the identity that it states")
+            raise ValueError("its identity is not that of its content")
         classes = self._table("classes", MAX_WIDTH)
         names = _texts([item["name"] for item in classes], "classes", MAX_WIDTH)
         outcomes = _texts(content["outcomes"], "outcomes", 100)
@@ -209,7 +209,7 @@ class _Checked:
             fps=_rate(content["settings"]["fixed"]["fps"]),
             settings=content["settings"],
             versions={k: _text(v, "versions") for k, v in content["versions"].items()},
-            plan=content["plan"],
+            spec=content["plan"],
         )
 
     def _table(self, key: str, most: int) -> list[dict[str, Any]]:
@@ -230,7 +230,7 @@ def _texts(value: Any, key: str, most: int) -> tuple[str, ...]:
         raise ValueError(f"{key}: expected a list of 1 to {most} texts")
     found = tuple(_text(item, key) for item in value)
     if len(set(found)) < len(found):
-        raise ValueError(f"{key}: one name stands there twice")
+        raise ValueError(f"{key}: a name occurs twice")
     return found
 
 

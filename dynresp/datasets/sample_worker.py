@@ -1,4 +1,4 @@
-"""The work of one worker, on this machine or another: draw samples, label them, pack a shard."""
+"""One worker, on this machine or another: it draws samples, labels them and encodes a shard."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dynresp.datasets.dataset_spec import DatasetPlan
-from dynresp.datasets.manifest import differences, make_manifest, told
+from dynresp.datasets.dataset_spec import DatasetSpec
+from dynresp.datasets.manifest import differences, differences_text, make_manifest
 from dynresp.datasets.sample_draws import check_durations, draw_sample
 from dynresp.datasets.shard_schema import columns, drawn, joined, labelled
-from dynresp.datasets.shards import Place, encode
+from dynresp.datasets.shards import ShardRange, encode
 from dynresp.motion.character import default_character
 from dynresp.motion.named_motion import load_spec_motion
 from dynresp.motion.reactions.named_library import load_named_library
@@ -19,41 +19,41 @@ from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.response.response_settings import response_config
 from dynresp.support.errors import DynrespError, MotionError, SpecError
 
-# Samples are labelled in bundles of this size, so that memory does not grow with a shard's.
-_BUNDLE = 100
+# Samples are labelled in batches of this size, so that memory does not grow with the shard.
+_BATCH = 100
 
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker has to know, small enough to be sent to it.
+    """What is sent to a worker.
 
     Attributes:
-        plan: The plan.
-        beside: Folder of the plan file, from which relative paths count.
-        motions: Motions folder that the user named.
-        manifest: Of the dataset, which the worker's own must equal.
+        spec: What the samples are drawn from.
+        spec_folder: Folder of the spec file, from which relative paths count.
+        motions: Motions folder that the user gave.
+        manifest: Of the dataset; the worker's own must be equal.
     """
 
-    plan: DatasetPlan
-    beside: Path
+    spec: DatasetSpec
+    spec_folder: Path
     motions: Path | None
     manifest: Mapping[str, Any]
 
 
-class Workshop:
-    """A plan with all that it needs, loaded.
+class SampleWorker:
+    """A dataset spec with its motions and its library, loaded.
 
     Attributes:
-        plan: The plan.
+        spec: What the samples are drawn from.
     """
 
-    def __init__(self, plan: DatasetPlan, beside: Path, motions: Path | None = None) -> None:
-        """Load motions and library, and cut the library's windows.
+    def __init__(self, spec: DatasetSpec, spec_folder: Path, motions: Path | None = None) -> None:
+        """Load motions and library.
 
         Args:
-            plan: The plan.
-            beside: Folder of the plan file, from which relative paths count.
-            motions: Motions folder that the user named.
+            spec: What the samples are drawn from.
+            spec_folder: Folder of the spec file, from which relative paths count.
+            motions: Motions folder that the user gave.
 
         Raises:
             MissingMotionDataError: A motion is not on this machine.
@@ -62,27 +62,27 @@ class Workshop:
         """
         from dynresp.response.search.hit_labels import OUTCOMES, Labeller
 
-        self.plan = plan
+        self.spec = spec
         self._character = default_character()
-        self._config = response_config(plan.settings)
+        self._config = response_config(spec.settings)
         folders, fps = motion_folders(motions), self._config.physics.fps
-        several = len(plan.base) > 1
+        several = len(spec.base) > 1
         self._bases = [
             load_spec_motion(
                 base,
                 base.otherwise,
                 f"base {number}" if several else "base",
                 folders,
-                beside,
+                spec_folder,
                 fps,
                 self._character,
             )
-            for number, base in enumerate(plan.base, start=1)
+            for number, base in enumerate(spec.base, start=1)
         ]
         self._durations = [base.motion.duration for base in self._bases]
-        check_durations(plan, self._durations)
+        check_durations(spec, self._durations)
         self._library = load_named_library(
-            plan.library.which, folders, beside, fps, self._character
+            spec.library.which, folders, spec_folder, fps, self._character
         )
         self._outcomes = OUTCOMES
         try:
@@ -94,13 +94,13 @@ class Workshop:
         self._layout = columns(len(names), len(self._labeller.classes))
 
     def manifest(self, shard_size: int) -> dict[str, Any]:
-        """The manifest of this plan's dataset.
+        """The manifest of this spec's dataset.
 
         Args:
             shard_size: How many samples a shard has.
         """
         return make_manifest(
-            self.plan,
+            self.spec,
             shard_size,
             self._character,
             self._bases,
@@ -111,42 +111,42 @@ class Workshop:
             self._outcomes,
         )
 
-    def make(self, place: Place, progress: Callable[[int], None] | None = None) -> bytes:
+    def make(self, shard: ShardRange, progress: Callable[[int], None] | None = None) -> bytes:
         """Draw and label the samples of a shard.
 
         Args:
-            place: Which shard.
+            shard: Which shard.
             progress: Told how many samples of it are done.
 
         Returns:
             The Parquet file.
         """
         parts = []
-        stop = place.first + place.rows
-        for start in range(place.first, stop, _BUNDLE):
-            indices = range(start, min(start + _BUNDLE, stop))
-            samples = [draw_sample(self.plan, self._durations, index) for index in indices]
+        stop = shard.first + shard.rows
+        for start in range(shard.first, stop, _BATCH):
+            indices = range(start, min(start + _BATCH, stop))
+            samples = [draw_sample(self.spec, self._durations, index) for index in indices]
             hits = [(self._bases[s.base].motion, s.impact) for s in samples]
             found = labelled(self._labeller.label(hits))
             parts.append({**drawn(samples, self._character), **found})
             if progress is not None:
-                progress(indices.stop - place.first)
-        return encode(joined(parts, self._layout), self._layout, place)
+                progress(indices.stop - shard.first)
+        return encode(joined(parts, self._layout), self._layout, shard)
 
 
-def load(job: Job) -> Workshop:
-    """Load a job where a worker is, and see that it has what the job was planned with.
+def load_worker(job: Job) -> SampleWorker:
+    """Load a job on the worker's machine, and check that it has the same data as the job.
 
     Raises:
-        DynrespError: Something is missing here, or is not what it is where the job comes from.
+        DynrespError: Something is missing on this machine, or differs from the job's manifest.
     """
-    workshop = Workshop(job.plan, job.beside, job.motions)
-    own = workshop.manifest(job.manifest["shard_size"])
+    worker = SampleWorker(job.spec, job.spec_folder, job.motions)
+    own = worker.manifest(job.manifest["shard_size"])
     found = differences(job.manifest, own)
     if found:
         raise DynrespError(
-            f"a worker has not what the plan was read with; different there: {told(found)}. "
-            "Install the same versions and put the same motion files there, and name their folder "
-            "with DYNRESP_MOTIONS."
+            f"the data of a worker differ from those of this machine: {differences_text(found)}. "
+            "Install the same versions and the same motion files there, and set DYNRESP_MOTIONS "
+            "to their folder."
         )
-    return workshop
+    return worker

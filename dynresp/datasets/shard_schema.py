@@ -1,4 +1,4 @@
-"""The columns of a shard. `docs/datasets.md` explains them to those who read the files."""
+"""The columns of a shard; `docs/datasets.md` explains them to users."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dynresp.response.search.hit_labels import Labelled
 
 SCHEMA_VERSION = 1
-"""Goes up with every change of columns or of what they mean."""
+"""Increases with every change of the columns or of their meaning."""
 
 MAX_WIDTH = 100_000
 """Most numbers in one cell."""
@@ -95,7 +95,7 @@ def columns(features: int, classes: int) -> tuple[Column, ...]:
 
 
 def arrow_schema(layout: Sequence[Column]) -> pa.Schema:
-    """The same for Arrow: a cell of several numbers is a list of fixed size; nothing is null."""
+    """The columns as an Arrow schema: several numbers are a list of fixed size; nothing is null."""
     require("pyarrow")
     import pyarrow as pa
 
@@ -117,13 +117,13 @@ def drawn(samples: Sequence[Sample], character: Character) -> Columns:
         "target": np.array([character.body(s.values["target"]) for s in samples], dtype="|i1"),
     }
     for name in PARAMETERS:
-        asked = [s.phase if name == "phase" else s.values.get(name) for s in samples]
-        found[name] = np.array([np.nan if v is None else v for v in asked], dtype="<f8")
+        values = [s.phase if name == "phase" else s.values.get(name) for s in samples]
+        found[name] = np.array([np.nan if v is None else v for v in values], dtype="<f8")
     return found
 
 
 def labelled(result: Labelled) -> Columns:
-    """Columns of what came of the hits."""
+    """Columns of what the hits did."""
     names = (
         "outcome", "contact_time_s", "contact_frame", "contact_body", "contact_force",
         "contact_point", "graze", "speed_change", "label", "errors", "exit_frames",
@@ -133,7 +133,7 @@ def labelled(result: Labelled) -> Columns:
 
 
 def joined(parts: Sequence[Mapping[str, npt.NDArray[Any]]], layout: Sequence[Column]) -> Columns:
-    """Rows one after the other, each column of the type that it has in the file."""
+    """Concatenate rows; each column gets its type in the file."""
     return {
         column.name: np.concatenate([part[column.name] for part in parts]).astype(column.dtype)
         for column in layout

@@ -1,8 +1,8 @@
-"""Shards: Parquet files of a fixed number of samples, each with a hash of its own contents.
+"""Shards: Parquet files of a fixed number of samples, each with a hash of its content.
 
-A shard says in its metadata which dataset it belongs to, which shard it is, and what its contents
-hash to. One that is damaged, cut off, of another dataset or in another's place gives itself away,
-and no second file has to agree with it, so a shard is good or not whenever a program was killed.
+The metadata of a shard hold its dataset, its number and the hash of its content. So a shard that is
+damaged, cut off, of another dataset or under a wrong name is found without a second file, also
+after a program was killed.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ class ShardError(DynrespError):
     """A shard that cannot be used; the message names the file and says why."""
 
 
-class ForeignShardError(ShardError):
-    """A whole shard, but of another dataset."""
+class OtherDatasetError(ShardError):
+    """An undamaged shard of another dataset."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """What a shard shall be.
+class ShardRange:
+    """Which samples a shard holds.
 
     Attributes:
         identity: Of its dataset.
@@ -59,7 +59,7 @@ class Place:
         return f"shard-{self.number:05d}.parquet"
 
 
-def places(identity: str, count: int, size: int) -> list[Place]:
+def shard_ranges(identity: str, count: int, size: int) -> list[ShardRange]:
     """All shards of a dataset.
 
     Args:
@@ -68,11 +68,11 @@ def places(identity: str, count: int, size: int) -> list[Place]:
         size: How many samples a shard has; the last may have fewer.
     """
     starts = range(0, count, size)
-    return [Place(identity, n, at, min(size, count - at)) for n, at in enumerate(starts)]
+    return [ShardRange(identity, n, at, min(size, count - at)) for n, at in enumerate(starts)]
 
 
 def shard_files(folder: Path) -> dict[int, Path]:
-    """Files in a folder that are called like shards, by their number."""
+    """Files in a folder with names of shards, by number."""
     found = {}
     for path in folder.iterdir():
         match = _NAME.fullmatch(path.name)
@@ -81,16 +81,15 @@ def shard_files(folder: Path) -> dict[int, Path]:
     return found
 
 
-def left_over(folder: Path) -> list[Path]:
-    """Half-written files under temporary names, which a killed program has left."""
+def leftover_files(folder: Path) -> list[Path]:
+    """Half-written files under temporary names, left by a killed program."""
     return sorted(path for path in folder.iterdir() if _LEFT_OVER.fullmatch(path.name))
 
 
-def stated(folder: Path) -> list[Place]:
-    """What the shards in a folder say that they are, where they can say it.
+def stated_ranges(folder: Path) -> list[ShardRange]:
+    """What the metadata of the shards in a folder say, without reading the samples.
 
-    This is read from their ends alone, without a look at the samples. A shard that is damaged
-    there is left out.
+    Shards with damaged metadata are left out.
     """
     require("pyarrow")
     import pyarrow as pa
@@ -106,17 +105,17 @@ def stated(folder: Path) -> list[Place]:
         if about.get("shard") != number or not isinstance(identity, str):
             continue
         if isinstance(first, int) and isinstance(rows, int):
-            found.append(Place(identity, number, first, rows))
+            found.append(ShardRange(identity, number, first, rows))
     return found
 
 
-def encode(columns: Columns, layout: Sequence[Column], place: Place) -> bytes:
+def encode(columns: Columns, layout: Sequence[Column], shard: ShardRange) -> bytes:
     """A shard as a Parquet file; the same contents give the same bytes.
 
     Args:
         columns: Its arrays, of the types and shapes of the layout.
         layout: Its columns.
-        place: Which shard it is.
+        shard: Which shard it is.
     """
     require("pyarrow")
     import pyarrow as pa
@@ -129,10 +128,10 @@ def encode(columns: Columns, layout: Sequence[Column], place: Place) -> bytes:
         lists = pa.FixedSizeListArray.from_arrays
         arrays.append(lists(flat, type=field.type) if column.width else flat)
     about = {
-        "dataset": place.identity,
-        "shard": place.number,
-        "first": place.first,
-        "rows": place.rows,
+        "dataset": shard.identity,
+        "shard": shard.number,
+        "first": shard.first,
+        "rows": shard.rows,
         "sha256": _hash(columns, layout),
     }
     schema = schema.with_metadata({_KEY: json.dumps(about).encode()})
@@ -141,7 +140,7 @@ def encode(columns: Columns, layout: Sequence[Column], place: Place) -> bytes:
     pq.write_table(
         pa.Table.from_arrays(arrays, schema=schema),
         sink,
-        row_group_size=max(place.rows, 1),
+        row_group_size=max(shard.rows, 1),
         compression="zstd",
         use_dictionary=False,
         use_byte_stream_split=floats,
@@ -150,18 +149,18 @@ def encode(columns: Columns, layout: Sequence[Column], place: Place) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def decode(data: bytes, layout: Sequence[Column], place: Place, source: str) -> Columns:
+def decode(data: bytes, layout: Sequence[Column], shard: ShardRange, source: str) -> Columns:
     """The arrays of a shard, checked.
 
     Args:
         data: The Parquet file.
-        layout: The columns that it shall have.
-        place: Which shard it shall be.
+        layout: The columns that it must have.
+        shard: Which shard it must be.
         source: Its name, for messages.
 
     Raises:
-        ForeignShardError: It is a shard of another dataset.
-        ShardError: It is damaged, or another shard than it shall be.
+        OtherDatasetError: It is a shard of another dataset.
+        ShardError: It is damaged, or another shard than it must be.
     """
     require("pyarrow")
     import pyarrow as pa
@@ -170,31 +169,31 @@ def decode(data: bytes, layout: Sequence[Column], place: Place, source: str) -> 
     try:
         file = pq.ParquetFile(pa.BufferReader(data))
         about = _about(file.schema_arrow.metadata, source)
-        _check_place(about, place, source)
+        _check_range(about, shard, source)
         if not file.schema_arrow.equals(arrow_schema(layout), check_metadata=False):
             raise ShardError(f"{source}: its columns are not those of its dataset")
-        _check_size(file.metadata, layout, place, source)
+        _check_size(file.metadata, layout, shard, source)
         table = file.read(use_threads=False)
-        columns = {column.name: _array(table, column, place.rows) for column in layout}
+        columns = {column.name: _array(table, column, shard.rows) for column in layout}
     # Arrow's own errors are ValueError, OSError, KeyError, MemoryError and NotImplementedError.
     except (ValueError, OSError, LookupError, MemoryError, NotImplementedError, TypeError) as error:
-        raise ShardError(f"{source}: damaged ({_short(error)})") from None
+        raise ShardError(f"{source}: damaged ({_error_text(error)})") from None
     if _hash(columns, layout) != about["sha256"]:
-        raise ShardError(f"{source}: damaged (its contents do not have the hash that it states)")
-    if not np.array_equal(columns["index"], np.arange(place.first, place.first + place.rows)):
+        raise ShardError(f"{source}: damaged (its content does not match its hash)")
+    if not np.array_equal(columns["index"], np.arange(shard.first, shard.first + shard.rows)):
         raise ShardError(f"{source}: damaged (its samples are not in order)")
     return columns
 
 
-def read_shard(folder: Path, layout: Sequence[Column], place: Place) -> Columns:
+def read_shard(folder: Path, layout: Sequence[Column], shard: ShardRange) -> Columns:
     """Read a shard's file.
 
     Raises:
-        ForeignShardError: It is a shard of another dataset.
-        ShardError: It is missing, damaged, or another shard than it shall be.
+        OtherDatasetError: It is a shard of another dataset.
+        ShardError: It is missing, damaged, or another shard than it must be.
     """
-    path = folder / place.name
-    most = _bytes(layout, place.rows) + _OVERHEAD_BYTES
+    path = folder / shard.name
+    most = _bytes(layout, shard.rows) + _OVERHEAD_BYTES
     try:
         with path.open("rb") as file:
             data = file.read(most + 1)
@@ -204,45 +203,45 @@ def read_shard(folder: Path, layout: Sequence[Column], place: Place) -> Columns:
         raise ShardError(f"{path}: cannot be read ({error.strerror})") from None
     if len(data) > most:
         raise ShardError(f"{path}: damaged (larger than {most} bytes)")
-    return decode(data, layout, place, str(path))
+    return decode(data, layout, shard, str(path))
 
 
 def _about(metadata: Mapping[bytes, bytes] | None, source: str) -> dict[str, Any]:
     try:
         about = json.loads((metadata or {})[_KEY])
     except (KeyError, ValueError, RecursionError):
-        raise ShardError(f"{source}: damaged (it does not say what it is)") from None
+        raise ShardError(f"{source}: damaged (no metadata of dynresp)") from None
     if not isinstance(about, dict):
-        raise ShardError(f"{source}: damaged (it does not say what it is)")
+        raise ShardError(f"{source}: damaged (no metadata of dynresp)")
     return about
 
 
-def _check_place(about: Mapping[str, Any], place: Place, source: str) -> None:
-    if about.get("dataset") != place.identity:
-        raise ForeignShardError(f"{source}: a shard of another dataset")
-    wanted = {"shard": place.number, "first": place.first, "rows": place.rows}
+def _check_range(about: Mapping[str, Any], shard: ShardRange, source: str) -> None:
+    if about.get("dataset") != shard.identity:
+        raise OtherDatasetError(f"{source}: a shard of another dataset")
+    wanted = {"shard": shard.number, "first": shard.first, "rows": shard.rows}
     for key, value in wanted.items():
         if about.get(key) != value:
             raise ShardError(f"{source}: expected {key} {value}, it has {about.get(key)!r}")
     if not isinstance(about.get("sha256"), str):
-        raise ShardError(f"{source}: damaged (it states no hash)")
+        raise ShardError(f"{source}: damaged (no hash)")
 
 
-def _check_size(metadata: Any, layout: Sequence[Column], place: Place, source: str) -> None:
-    """Refuse what claims more than it can hold, before it is unpacked."""
-    if metadata.num_rows != place.rows or metadata.num_row_groups != 1:
+def _check_size(metadata: Any, layout: Sequence[Column], shard: ShardRange, source: str) -> None:
+    """Refuse a file that claims an impossible size, before it is decompressed."""
+    if metadata.num_rows != shard.rows or metadata.num_row_groups != 1:
         raise ShardError(
-            f"{source}: damaged (expected {place.rows} rows in one group, got "
+            f"{source}: damaged (expected {shard.rows} rows in one group, got "
             f"{metadata.num_rows} in {metadata.num_row_groups})"
         )
     group = metadata.row_group(0)
     claimed = sum(group.column(i).total_uncompressed_size for i in range(group.num_columns))
-    if not 0 <= claimed <= _bytes(layout, place.rows) + _OVERHEAD_BYTES:
-        raise ShardError(f"{source}: damaged (it claims to unpack to {claimed} bytes)")
+    if not 0 <= claimed <= _bytes(layout, shard.rows) + _OVERHEAD_BYTES:
+        raise ShardError(f"{source}: damaged (it claims {claimed} bytes decompressed)")
 
 
 def _bytes(layout: Sequence[Column], rows: int) -> int:
-    """The numbers of so many rows [bytes], and a byte for each: Parquet's levels of lists."""
+    """Size of the numbers of some rows [bytes], and a byte each for Parquet's list levels."""
     return rows * sum((np.dtype(c.dtype).itemsize + 1) * max(c.width, 1) for c in layout)
 
 
@@ -265,6 +264,6 @@ def _hash(columns: Columns, layout: Sequence[Column]) -> str:
     return digest.hexdigest()
 
 
-def _short(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     text = " ".join(str(error).split())
     return text[:200] if text else type(error).__name__

@@ -1,4 +1,4 @@
-"""What any classifier must beat: nearest neighbours, the most frequent classes, and chance."""
+"""Baselines that any classifier must beat: nearest neighbours, the most frequent class, chance."""
 
 from __future__ import annotations
 
@@ -12,20 +12,19 @@ from dynresp.learning.labelled_samples import Labelled
 from dynresp.support.extras import require
 
 NEIGHBOURS = 7
-"""How many vote."""
+"""Number of neighbours that vote."""
 
 
 def nearest_neighbours(
     learning: Labelled, features: npt.NDArray[np.float32], classes: int
 ) -> Choices:
-    """The two classes that the most of the nearest samples have.
+    """The two most frequent classes among the nearest samples.
 
-    Distances are those of the standardised features. Of equal votes the class of the nearer
-    neighbour comes first; where all neighbours agree, the second class is the most frequent of the
-    others.
+    Distances are of standardised features. With equal votes, the class of the nearer neighbour
+    comes first; if all neighbours agree, the second class is the most frequent of the others.
 
     Args:
-        learning: The samples to look among.
+        learning: The training samples.
         features: (n, F) of the samples to predict.
         classes: How many classes there are.
 
@@ -46,19 +45,19 @@ def nearest_neighbours(
     )
     votes = np.zeros((len(features), classes))
     rows = np.arange(len(features))
-    for place in range(neighbours):
-        # Half as much for each place: together less than a vote.
-        votes[rows, learning.labels[found[:, place]]] += 1.0 + 0.5 ** (place + 2)
+    for rank in range(neighbours):
+        # Nearer neighbours count a little more: together less than a vote.
+        votes[rows, learning.labels[found[:, rank]]] += 1.0 + 0.5 ** (rank + 2)
     frequency = np.bincount(learning.labels, minlength=classes) / len(learning)
     return _two_best(votes + 1e-3 * frequency)
 
 
 def most_frequent(counts: Sequence[int], samples: int) -> Choices:
-    """The two classes that most samples were labelled with, whatever the features.
+    """The two most frequent classes of the training samples, for every sample.
 
     Args:
         counts: Of the training samples of each class.
-        samples: How many to predict.
+        samples: Number of samples to predict.
 
     Returns:
         (samples, 2) classes.
@@ -67,12 +66,12 @@ def most_frequent(counts: Sequence[int], samples: int) -> Choices:
 
 
 def at_random(classes: Sequence[int], samples: int, rng: np.random.Generator) -> Choices:
-    """Two different classes by chance.
+    """Two different random classes for each sample.
 
     Args:
         classes: Those to choose from, at least two.
-        samples: How many to predict.
-        rng: The source of chance.
+        samples: Number of samples to predict.
+        rng: Random numbers.
 
     Returns:
         (samples, 2) classes.

@@ -1,7 +1,7 @@
-"""How good choices are, against the oracle's.
+"""Metrics of choices, compared with those of the full search: accuracy, regret, confusion.
 
-Accuracy alone judges too hard: in many hits the two best reactions fit nearly as well. The regret
-says what a wrong choice costs: how much larger its window error is than that of the oracle's.
+Accuracy alone is too strict: in many hits the two best reactions fit nearly as well. Regret is the
+cost of a wrong choice: how much larger its mismatch (window error) is than the full search's.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from dynresp.response.search.full_search import ERROR_FLOOR
 from dynresp.support.errors import UsageError
 
 WITHIN = 0.01
-"""A choice is as good as the oracle's where its error is larger by no more than this share."""
+"""A choice counts as equally good if its error is larger by at most this share."""
 
 Choices = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Figures:
-    """How good the choices for some samples are; shares from 0 to 1.
+class ChoiceMetrics:
+    """Metrics of the choices for some samples; shares from 0 to 1.
 
     Attributes:
         samples: How many samples.
-        accuracy: Share in which the first choice is the oracle's.
-        top2_accuracy: Share in which one of the two best is.
-        within_1_percent: Share in which the first choice's error is at most 1 % above the oracle's.
-        regret: Mean of what the first choice's error is above the oracle's, as a share of that.
-        regret_top2: The same where the better of the two best is taken.
+        accuracy: Share in which the first choice is that of the full search.
+        top2_accuracy: Share in which one of the two best choices is.
+        within_1_percent: Share in which the error of the first choice is at most 1 % larger.
+        regret: Mean of `regrets` of the first choice.
+        regret_top2: The same for the better of the two best choices.
     """
 
     samples: int
@@ -42,27 +42,27 @@ class Figures:
     regret_top2: float
 
     def to_json(self) -> dict[str, int | float]:
-        """The figures by name."""
+        """The metrics by name."""
         return asdict(self)
 
 
-def measure(ranked: npt.NDArray[np.integer], labels: Choices, errors: FloatArray) -> Figures:
-    """Judge choices.
+def measure(ranked: npt.NDArray[np.integer], labels: Choices, errors: FloatArray) -> ChoiceMetrics:
+    """Measure choices.
 
     Args:
-        ranked: (n, 2 or more) classes chosen, the best first.
-        labels: (n,) classes that the oracle chose.
+        ranked: (n, 2 or more) classes chosen, best first.
+        labels: (n,) classes that the full search chose.
         errors: (n, classes) window errors [m].
 
     Raises:
         UsageError: There are no samples.
     """
     if not len(labels):
-        raise UsageError("there are no samples to judge a classifier by")
+        raise UsageError("there are no samples to measure a classifier with")
     right = ranked[:, :2] == labels[:, None]
     first = regrets(ranked[:, 0], labels, errors)
     second = regrets(ranked[:, 1], labels, errors)
-    return Figures(
+    return ChoiceMetrics(
         samples=len(labels),
         accuracy=float(right[:, 0].mean()),
         top2_accuracy=float(right.any(axis=1).mean()),
@@ -73,18 +73,18 @@ def measure(ranked: npt.NDArray[np.integer], labels: Choices, errors: FloatArray
 
 
 def regrets(chosen: npt.NDArray[np.integer], labels: Choices, errors: FloatArray) -> FloatArray:
-    """What each choice costs: max(0, error / error of the oracle's choice - 1).
+    """The cost of each choice: max(0, error / error of the full search's choice - 1).
 
-    The oracle does not always choose the least error, since it goes on with the base motion only
-    where that fits well; a choice that would fit better than the oracle's costs nothing.
+    The full search does not always choose the least error, because it lets the base motion go on
+    only where that fits well. A choice with a smaller error costs nothing.
 
     Args:
         chosen: (n,) classes chosen.
-        labels: (n,) classes that the oracle chose.
+        labels: (n,) classes that the full search chose.
         errors: (n, classes) window errors [m].
     """
     rows = np.arange(len(labels))
-    # Below the floor, errors are rounding.
+    # Errors below the floor are rounding errors.
     least = np.maximum(errors[rows, labels], ERROR_FLOOR)
     return np.asarray(np.maximum(errors[rows, chosen] / least - 1.0, 0.0))
 
@@ -98,23 +98,22 @@ def in_use(
 ) -> Choices:
     """Choices as the responder makes them with a classifier (`classifier_choice`).
 
-    Whether the base motion is carried on it measures, as the oracle does: after a graze always, and
-    else where it fits well enough and better than the reaction that was predicted. So of what was
-    predicted only the order of the reactions counts.
+    The responder itself measures whether a reaction is needed, as the full search does: none after
+    a graze, and none where the base motion fits well enough and better than the predicted reaction.
+    So only the order of the predicted reactions counts.
 
     Args:
-        ranked: (n, 2 or more) classes, the best first.
+        ranked: (n, 2 or more) classes, best first.
         errors: (n, classes) window errors [m].
         grazes: (n,) which hits were grazes.
-        carry_on: The class to carry on.
-        limit: Largest error with which the base motion is carried on [m].
+        carry_on: The class "no reaction".
+        limit: Largest error with which the base motion goes on [m].
 
     Returns:
-        (n, 2): the choice, and the best of what else would be aligned were there time for one
-        more reaction.
+        (n, 2): the choice, and the second choice, for a budget that aligns one more reaction.
     """
     rows = np.arange(len(ranked))
-    # A stable sort by "is to carry on" brings the reactions to the front, in their order.
+    # A stable sort by "is no reaction" brings the reactions to the front, in their order.
     order = np.argsort(ranked == carry_on, axis=1, kind="stable")
     reactions = np.take_along_axis(np.asarray(ranked, dtype=np.intp), order, axis=1)[:, :2]
     first, other = reactions.T
@@ -126,7 +125,7 @@ def in_use(
 
 
 def merge_mirrors(classes: npt.NDArray[np.integer], mirrors: Choices) -> Choices:
-    """Classes with each one's mirror image counted as itself.
+    """Classes, with mirror images counted as the same class.
 
     Args:
         classes: Any shape.
@@ -139,7 +138,7 @@ def merge_mirrors(classes: npt.NDArray[np.integer], mirrors: Choices) -> Choices
 def confusion(
     chosen: npt.NDArray[np.integer], labels: Choices, classes: int
 ) -> npt.NDArray[np.int64]:
-    """How often each class was chosen (columns) where the oracle chose each class (rows)."""
+    """How often each class was chosen (columns) where the full search chose each class (rows)."""
     counts = np.zeros((classes, classes), dtype=np.int64)
     np.add.at(counts, (labels, chosen), 1)
     return counts

@@ -1,7 +1,7 @@
-"""What one class stands for: a reaction, or all reactions of a strategy.
+"""Classes of a classifier: one per reaction, or one per strategy.
 
-Zordan et al. 2007 (section 7) propose the latter for large libraries: the classifier picks the
-strategy, and alignment picks the example within it.
+Zordan et al. 2007 (section 7) propose strategies for large libraries: the classifier predicts the
+strategy, and alignment selects the reaction.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from dynresp.support.errors import UnknownNameError, UsageError
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """How the choices of a dataset fall into classes.
+    """The classes of a dataset's choices.
 
     Attributes:
-        names: Of the classes; to carry on is one by itself, the last.
-        members: For each class the choices that belong to it.
+        names: Of the classes; the last is "no reaction" (`CARRY_ON`).
+        members: For each class its choices.
         of: (choices,) the class of each choice of the dataset.
         strategies: Strategy of each class; that of `CARRY_ON` is `CARRY_ON`.
-        mirrors: (classes,) the class that is each one's mirror image, itself where there is none.
+        mirrors: (classes,) index of each class's mirror image; its own where it has none.
     """
 
     names: tuple[str, ...]
@@ -37,11 +37,11 @@ class Groups:
 
     @property
     def carry_on(self) -> int:
-        """The class to carry on with the base motion."""
+        """Index of the class "no reaction": the base motion goes on."""
         return self.names.index(CARRY_ON)
 
     def labels(self, labels: npt.NDArray[np.integer]) -> npt.NDArray[np.intp]:
-        """Classes of the oracle's choices, (n,)."""
+        """Classes of the full search's choices, (n,)."""
         return self.of[labels]
 
     def errors(self, errors: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
@@ -62,18 +62,18 @@ def make_groups(
     mirrors: Sequence[int],
     by: str,
 ) -> Groups:
-    """Put the choices of a dataset into classes.
+    """Group the choices of a dataset into classes.
 
     Args:
         choices: Names of the reactions, then `CARRY_ON`.
         strategies: Strategy of each.
-        mirrors: For each the place of its mirror image.
-        by: "reactions" for one class each; "strategies" for one class a strategy, mirror images
-            and all.
+        mirrors: For each the index of its mirror image.
+        by: "reactions" for one class each; "strategies" for one class per strategy, which holds
+            mirror images, too.
 
     Raises:
         UnknownNameError: There is no such grouping.
-        UsageError: The last choice is not to carry on.
+        UsageError: The last choice is not `CARRY_ON`.
     """
     if by not in GROUPINGS:
         raise UnknownNameError("grouping of classes", by, GROUPINGS)
@@ -93,5 +93,5 @@ def make_groups(
         for strategy in names
     )
     of = np.array([names.index(strategy) for strategy in strategies])
-    # A strategy is mirrored onto itself: left and right are members of the same class.
+    # A strategy holds its own mirror images.
     return Groups(names, members, of, names, np.arange(len(names)))

@@ -1,4 +1,4 @@
-"""Judging a classifier by samples that it was not trained on."""
+"""Measure how well a classifier chooses, on samples that it was not trained on."""
 
 from __future__ import annotations
 
@@ -25,40 +25,40 @@ from dynresp.response.prediction.classifier import Classifier, ClassifierError, 
 from dynresp.support.errors import UsageError
 from dynresp.support.progress import Progress
 
-# Nearest neighbours take a second for so many samples and a hundred thousand to look among.
-_MOST_NEIGHBOURED = 2_000
+# Most samples that nearest neighbours predict: a second with a hundred thousand training samples.
+_MAX_NEIGHBOUR_SAMPLES = 2_000
 
 
 def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> dict[str, Any]:
-    """Judge a classifier.
+    """Measure how well a classifier chooses.
 
-    Of the dataset that it was trained on, only the samples that were held out count; of any other,
-    all. Samples in which nothing was hit, or whose features are not all there, are left out.
+    Of its own training dataset only the held-out samples count; of any other dataset all. Misses
+    and samples with missing features are left out.
 
     Args:
         classifier: The classifier.
         dataset: Labelled hits, of the same library and character.
-        progress: Told the stage, how many are done, and of how many.
+        progress: Called with stage, number done, and number in all.
 
     Returns:
-        What `evaluation.json` holds; `docs/learning.md` explains it. The figures at the top are
-        those of the exact model, mirror images being two classes.
+        The content of `evaluation.json`; `docs/learning.md` explains it. The values at the top are
+        of the exact model, with mirror images as two classes.
 
     Raises:
         ClassifierError: The dataset is of another library or character.
-        UsageError: There are no samples to judge by.
+        UsageError: There are no samples to measure with.
     """
     facts = dataset.facts
     classifier.check(TrainedFor(facts.library, facts.library_identity, facts.character_identity))
     groups = groups_of(dataset, classifier.grouping)
-    strange = [name for name in classifier.classes if name not in groups.names]
-    if strange:
+    unknown = [name for name in classifier.classes if name not in groups.names]
+    if unknown:
         raise ClassifierError(
-            f"the classifier predicts {strange[0]!r}, which the dataset has not; train it anew"
+            f"the classifier predicts {unknown[0]!r}, which is not in the dataset; train it again"
         )
     known = np.array([groups.names.index(name) for name in classifier.classes], dtype=np.intp)
     usable = labelled(dataset, groups, classifier.columns)
-    learning, judged = _parted(classifier, dataset, usable)
+    learning, judged = _split_samples(classifier, dataset, usable)
 
     progress("predicting", 0, 1)
     most = min(3, len(classifier.classes))
@@ -70,9 +70,9 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
     latency = latency_us(classifier, dataset.features[np.isin(dataset.index, judged.index[:300])])
     progress("measuring", 1, 1)
     return {
-        "model": _about_model(classifier),
+        "model": _model_summary(classifier),
         "dataset": {
-            "plan": facts.plan["plan"]["name"],
+            "plan": facts.spec["plan"]["name"],
             "identity": facts.identity,
             "library": facts.library,
             "bases": list(facts.bases),
@@ -86,9 +86,9 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
             "not_held_out": len(usable) - len(judged),
         },
         "differing_settings": classifier.differing_settings(facts.settings),
-        **_figures(exact, judged, groups),
+        **_metrics(exact, judged, groups),
         "reduced": {
-            **_figures(reduced, judged, groups),
+            **_metrics(reduced, judged, groups),
             "agreement": float(np.mean(exact[:, 0] == reduced[:, 0])),
         },
         "baselines": baselines,
@@ -103,10 +103,10 @@ def evaluate(classifier: Classifier, dataset: Dataset, progress: Progress) -> di
     }
 
 
-def _parted(
+def _split_samples(
     classifier: Classifier, dataset: Dataset, usable: Labelled
 ) -> tuple[Labelled, Labelled]:
-    """The samples that it was trained on, where they are in the dataset, and those to judge by."""
+    """The training samples, as far as they are in the dataset, and the samples to measure with."""
     trained_on = classifier.trained_on
     nothing = np.zeros(0, dtype=np.intp)
     if dataset.facts.origin != trained_on.dataset:
@@ -114,25 +114,25 @@ def _parted(
     else:
         split = Split(trained_on.seed, trained_on.held_out)
         judged = usable.take(split.is_held_out(usable.index))
-        # The dataset may have grown since.
+        # The dataset may have grown since the training.
         before = usable.take(usable.index < trained_on.count)
         learning = before.take(split.trained(before.index, trained_on.limit))
         if not len(judged):
             raise UsageError(
                 f"the classifier was trained on this dataset with a share of "
-                f"{trained_on.held_out:g} held out, so that there is no sample to judge it by; "
-                "give another dataset, or train it with a larger --held-out"
+                f"{trained_on.held_out:g} held out, so that there is no sample to measure it with; "
+                "give another dataset, or train with a larger --held-out"
             )
     if not len(judged):
         raise UsageError(
-            f"none of the {len(dataset)} samples can be judged by: nothing was hit in them, or "
-            "their features are not all there"
+            f"none of the {len(dataset)} samples can be used: they are misses, or features are "
+            "missing"
         )
     return learning, judged
 
 
-def _figures(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, Any]:
-    """Figures of choices as the responder makes them, and of the predictions alone."""
+def _metrics(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, Any]:
+    """Metrics of the choices as the responder makes them, and of the predictions alone."""
     used = _in_use(ranked, judged, groups)
     return {**_measured(used, judged, groups), "alone": _measured(ranked, judged, groups)}
 
@@ -151,7 +151,7 @@ def _measured(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, An
 
 
 def _reactions_accuracy(ranked: Choices, judged: Labelled, groups: Groups) -> float | None:
-    """Share of the oracle's choice where that is a reaction; None where it never is."""
+    """Accuracy where the full search chose a reaction; None if it never did."""
     rows = judged.labels != groups.carry_on
     return float(np.mean(ranked[rows, 0] == judged.labels[rows])) if rows.any() else None
 
@@ -166,13 +166,13 @@ def _mirrors_as_one(ranked: Choices, judged: Labelled, groups: Groups) -> dict[s
 
 
 def _strategy_accuracy(ranked: Choices, judged: Labelled, groups: Groups) -> float:
-    """Share in which the first choice is of the strategy that the oracle's is of."""
+    """Share in which the first choice has the same strategy as the full search's."""
     strategies = np.array(groups.strategies)
     return float(np.mean(strategies[ranked[:, 0]] == strategies[judged.labels]))
 
 
 def _per_strategy(ranked: Choices, judged: Labelled, groups: Groups) -> dict[str, Any]:
-    """Figures for the samples of each strategy, by the oracle's choice."""
+    """Metrics for the samples of each strategy, by the choice of the full search."""
     strategies = np.array(groups.strategies)[judged.labels]
     table = {}
     for strategy in dict.fromkeys(groups.strategies):
@@ -193,22 +193,22 @@ def _baselines(
     learning: Labelled,
     judged: Labelled,
 ) -> dict[str, Any]:
-    """Figures of the baselines; of the neighbours none without the samples to look among."""
+    """Metrics of the baselines; None for the neighbours if the training samples are not here."""
     counts = [classifier.facts["samples_per_class"].get(name, 0) for name in groups.names]
     rng = np.random.default_rng(classifier.trained_on.seed)
     found: dict[str, Any] = {
-        "random": _figures(at_random(known.tolist(), len(judged), rng), judged, groups),
-        "most_frequent": _figures(most_frequent(counts, len(judged)), judged, groups),
+        "random": _metrics(at_random(known.tolist(), len(judged), rng), judged, groups),
+        "most_frequent": _metrics(most_frequent(counts, len(judged)), judged, groups),
         "nearest_neighbours": None,
     }
     if len(learning):
-        some = judged.take(np.sort(rng.permutation(len(judged))[:_MOST_NEIGHBOURED]))
+        some = judged.take(np.sort(rng.permutation(len(judged))[:_MAX_NEIGHBOUR_SAMPLES]))
         ranked = nearest_neighbours(learning, some.features, len(groups.names))
-        found["nearest_neighbours"] = _figures(ranked, some, groups)
+        found["nearest_neighbours"] = _metrics(ranked, some, groups)
     return found
 
 
-def _about_model(classifier: Classifier) -> dict[str, Any]:
+def _model_summary(classifier: Classifier) -> dict[str, Any]:
     facts = classifier.facts
     return {
         "grouping": classifier.grouping,

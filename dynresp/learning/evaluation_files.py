@@ -1,4 +1,4 @@
-"""The folder of an evaluation: `evaluation.json`, `per_strategy.csv` and `confusion.png`."""
+"""Write the folder of an evaluation: `evaluation.json`, `per_strategy.csv` and `confusion.png`."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ EVALUATION, TABLE, PICTURE = "evaluation.json", "per_strategy.csv", "confusion.p
 
 _DPI = 150
 _INK = "#23272e"
-# More classes are drawn without their names and numbers, which nobody could read.
-_MOST_NAMED, _MOST_NUMBERED = 80, 40
+# Above these numbers of classes, names or numbers would be too small to read and are left out.
+_MAX_NAMED, _MAX_NUMBERED = 80, 40
 
 
 def write_report(folder: Path, content: dict[str, Any]) -> dict[str, str]:
     """Write an evaluation.
 
     Args:
-        folder: Where to; made if it is missing.
+        folder: The folder; made if it is missing.
         content: What `evaluate` gives.
 
     Returns:
-        For each file what came of it, as `result_folder.attempt` says it.
+        For each file what became of it, as `result_folder.attempt` returns it.
 
     Raises:
         DynrespError: `evaluation.json` or `per_strategy.csv` cannot be written.
@@ -55,7 +55,7 @@ def _write_table(path: Path, per_strategy: dict[str, dict[str, Any]]) -> None:
 
 
 def write_confusion(path: Path, content: dict[str, Any]) -> None:
-    """Write the confusion matrix as a PNG; classes that nobody chose are left out.
+    """Write the confusion matrix as a PNG; classes that were never chosen are left out.
 
     Args:
         path: The file; missing folders are made.
@@ -73,22 +73,22 @@ def write_confusion(path: Path, content: dict[str, Any]) -> None:
     names = [content["confusion"]["classes"][i].replace("_", " ") for i in seen]
     rows = [f"{name} ({n})" for name, n in zip(names, counts.sum(axis=1), strict=True)]
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    size = 3.2 + 0.3 * min(len(seen), _MOST_NUMBERED)
+    size = 3.2 + 0.3 * min(len(seen), _MAX_NUMBERED)
     figure = Figure((size + 0.8, size), dpi=_DPI, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=1.0)
-    if len(seen) <= _MOST_NAMED:
+    if len(seen) <= _MAX_NAMED:
         axes.set_xticks(range(len(seen)), names, rotation=90, fontsize=7, parse_math=False)
         axes.set_yticks(range(len(seen)), rows, fontsize=7, parse_math=False)
-    if len(seen) <= _MOST_NUMBERED:
+    if len(seen) <= _MAX_NUMBERED:
         _number(axes, shares)
     axes.set_xlabel("chosen with the classifier, in use", fontsize=8.5)
-    axes.set_ylabel("chosen by the oracle (how often)", fontsize=8.5)
+    axes.set_ylabel("chosen by the full search (how often)", fontsize=8.5)
     bar = figure.colorbar(image, ax=axes, shrink=0.7, pad=0.02)
-    bar.set_label("share of the oracle's", fontsize=8.5)
+    bar.set_label("share of the row", fontsize=8.5)
     bar.ax.tick_params(labelsize=8)
     figure.suptitle(
-        f"{content['accuracy']:.1%} of {content['samples']} samples as the oracle chose",
+        f"{content['accuracy']:.1%} of {content['samples']} samples as the full search chose",
         x=0.012, ha="left", fontsize=11, fontweight="bold", color=_INK,
     )  # fmt: skip
     with replacing(path) as temporary:

@@ -1,7 +1,7 @@
-"""Which samples are held out and which are trained on, decided by each sample's own index.
+"""Split samples into held-out and training samples, by a hash of each sample's index.
 
-A sample keeps its part however many samples there are and in whatever order they come, so a
-dataset that has grown since, or a model trained on fewer samples, is judged on the same ones.
+The part of a sample does not depend on the number or the order of the samples. So a classifier is
+measured on the same samples after the dataset has grown, or when it is trained on fewer samples.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _MIX = ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB))
 
 @dataclass(frozen=True)
 class Split:
-    """A rule by which samples are parted.
+    """How samples are split.
 
     Attributes:
-        seed: Of the chance that decides.
+        seed: Of the random split.
         held_out: Share of the samples that are not trained on, at least 0 and below 1.
     """
 
@@ -52,35 +52,35 @@ class Split:
         """Whether samples are held out.
 
         Args:
-            index: (n,) their places in the dataset.
+            index: (n,) their numbers in the dataset.
         """
-        return self._chance(index, _HELD_OUT) < self.held_out
+        return self._random(index, _HELD_OUT) < self.held_out
 
     def trained(self, index: npt.ArrayLike, samples: int | None = None) -> IndexArray:
         """Rows to train on, in the order of the samples' indices.
 
-        Fewer samples are always a part of more.
+        Fewer samples are always a subset of more.
 
         Args:
-            index: (n,) places in the dataset.
-            samples: How many at most; None for all that are not held out.
+            index: (n,) numbers in the dataset.
+            samples: At most this many; None for all that are not held out.
 
         Returns:
             Rows of `index`.
         """
-        places = np.asarray(index)
-        rows = np.flatnonzero(~self.is_held_out(places))
-        return rows[self._first(places[rows], samples, _TAKEN)]
+        numbers = np.asarray(index)
+        rows = np.flatnonzero(~self.is_held_out(numbers))
+        return rows[self._first(numbers[rows], samples, _TAKEN)]
 
     def searched(self, index: npt.ArrayLike, samples: int) -> IndexArray:
-        """So many rows, in the order of the samples' indices, to search parameters on."""
+        """At most this many rows to search parameters on, in the order of the samples' indices."""
         return self._first(np.asarray(index), samples, _SEARCHED)
 
     def folds(self, index: npt.ArrayLike, labels: npt.ArrayLike, count: int) -> IndexArray:
         """The fold of each sample, every class spread evenly over the folds.
 
         Args:
-            index: (n,) places in the dataset.
+            index: (n,) numbers in the dataset.
             labels: (n,) classes.
             count: How many folds.
 
@@ -88,20 +88,20 @@ class Split:
             (n,) from 0 to `count` - 1. Two samples of one class that has no others lie in
             different folds.
         """
-        order = np.lexsort((self._chance(index, _SEARCHED), np.asarray(labels)))
+        order = np.lexsort((self._random(index, _SEARCHED), np.asarray(labels)))
         folds = np.empty(len(order), dtype=np.intp)
         folds[order] = np.arange(len(order)) % count
         return folds
 
     def _first(self, index: npt.NDArray[np.integer], samples: int | None, use: int) -> IndexArray:
-        """So many rows by chance, or all, in the order of their indices."""
-        rows = np.lexsort((index, self._chance(index, use)))[:samples]
+        """At most this many random rows, or all, in the order of their indices."""
+        rows = np.lexsort((index, self._random(index, use)))[:samples]
         return rows[np.argsort(index[rows], kind="stable")]
 
-    def _chance(self, index: npt.ArrayLike, use: int) -> FloatArray:
-        """A number from 0 to below 1 for each sample, another one for each use."""
-        state = _mixed(np.array([self.seed], dtype=np.uint64) + np.uint64(use) * _steps(1))
-        bits = _mixed(np.asarray(index).astype(np.uint64) * _STEP + state)
+    def _random(self, index: npt.ArrayLike, use: int) -> FloatArray:
+        """A random number from 0 to below 1 for each sample and use."""
+        state = _mix_bits(np.array([self.seed], dtype=np.uint64) + np.uint64(use) * _steps(1))
+        bits = _mix_bits(np.asarray(index).astype(np.uint64) * _STEP + state)
         return (bits >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
 
@@ -109,7 +109,7 @@ def _steps(count: int) -> npt.NDArray[np.uint64]:
     return np.full(count, _STEP)
 
 
-def _mixed(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+def _mix_bits(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
     """Every bit of the result depends on every bit given; arithmetic is modulo 2^64."""
     for shift, factor in _MIX:
         bits = (bits ^ (bits >> np.uint64(shift))) * np.uint64(factor)

@@ -1,4 +1,4 @@
-"""The samples of a dataset as a classifier learns from them and is judged by them."""
+"""The samples of a dataset that a classifier is trained on or measured with."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from dynresp.support.errors import UsageError
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
-    """Samples to fit or to judge by, arrays over n of them.
+    """Labelled samples, as arrays of length n.
 
     Attributes:
-        index: (n,) places in their dataset.
-        features: (n, F), those that the classifier takes, finite.
+        index: (n,) numbers in their dataset.
+        features: (n, F) the classifier's features, finite.
         labels: (n,) classes.
         errors: (n, classes) window errors [m].
         grazes: (n,) which hits were grazes.
-        carry_on_limit: Largest window error with which the base motion is carried on after a hit
-            that was no graze [m].
+        carry_on_limit: Largest window error with which the base motion goes on after a hit that
+            is not a graze [m].
     """
 
     index: npt.NDArray[np.int64]
@@ -53,7 +53,7 @@ class Labelled:
 
 
 def groups_of(dataset: Dataset, by: str) -> Groups:
-    """How the choices of a dataset fall into classes.
+    """The classes of a dataset's choices.
 
     Args:
         dataset: The dataset.
@@ -73,14 +73,13 @@ def groups_of(dataset: Dataset, by: str) -> Groups:
 
 
 def labelled(dataset: Dataset, groups: Groups, columns: npt.NDArray[np.intp]) -> Labelled:
-    """The samples of a dataset that can be learnt from.
+    """The samples of a dataset that can be used.
 
-    Left out are those in which nothing was hit or that diverged, and those whose features are not
-    all there.
+    Misses, diverged simulations and samples with missing features are left out.
 
     Args:
         dataset: The dataset.
-        groups: What its classes are.
+        groups: Its classes.
         columns: The features to take.
     """
     rows = np.flatnonzero(dataset.label >= 0)

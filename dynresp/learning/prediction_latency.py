@@ -1,4 +1,4 @@
-"""How long a prediction takes on this machine."""
+"""Measure how long a prediction takes on this machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynresp.response.prediction.classifier import Classifier
 
 BATCH = 1_000
-"""Hits predicted at once, where many are."""
+"""Hits in a batch."""
 
 _ALONE, _TOGETHER = 300, 7
 
@@ -20,7 +20,7 @@ _ALONE, _TOGETHER = 300, 7
 def latency_us(
     classifier: Classifier, features: npt.NDArray[np.float32]
 ) -> dict[str, dict[str, float]]:
-    """Median time of a prediction [microseconds], picking the features included.
+    """Median time of a prediction [microseconds], including the selection of the features.
 
     Args:
         classifier: The classifier.
@@ -44,7 +44,7 @@ def latency_us(
 
 
 def _median(calls: Sequence[Callable[[], object]]) -> float:
-    """Median duration [s] of calls after a first one that warms up."""
+    """Median duration [s] of some calls, after one that warms up."""
     calls[0]()
     durations = []
     for call in calls:

@@ -1,4 +1,4 @@
-"""Fitting the support vector machine, and searching its parameters.
+"""Fit the support vector machine, and search its parameters by cross-validation.
 
 The pipeline is `StandardScaler`, `PCA`, `SVC` with a polynomial kernel of degree two, the kind that
 `dynresp.response.prediction.compiled_classifier` compiles. Degree three and features without
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.learning.choice_metrics import Figures, in_use, measure
+from dynresp.learning.choice_metrics import ChoiceMetrics, in_use, measure
 from dynresp.learning.labelled_samples import Labelled
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
@@ -32,19 +32,19 @@ Result = TypeVar("Result")
 
 # Memory for rows of the kernel [MiB]; each is as long as there are samples.
 _CACHE_MIB = 1_000
-# While a fit goes on, progress is told this often [s].
+# During a fit, progress is called this often [s].
 _TELL_S = 0.5
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a fit leaves open.
+    """Parameters of a fit.
 
     Attributes:
-        components: Principal components; fewer where there are fewer features or samples.
-        penalty: Of samples on the wrong side, C.
-        gamma_factor: The kernel's gamma in terms of scikit-learn's "scale", one over the sum of
-            the components' variances.
+        components: Number of principal components; fewer if there are fewer features or samples.
+        penalty: C, the penalty for samples on the wrong side.
+        gamma_factor: The kernel's gamma as a multiple of scikit-learn's "scale", which is one over
+            the sum of the components' variances.
     """
 
     components: int
@@ -53,20 +53,20 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Tried:
-    """What cross-validation found of one set of parameters.
+class TriedParameters:
+    """Result of the cross-validation of one set of parameters.
 
     Attributes:
         parameters: The parameters.
-        figures: Over all folds, of the choices as the responder makes them.
+        metrics: Of all folds together, of the choices as the responder makes them.
     """
 
     parameters: Parameters
-    figures: Figures
+    metrics: ChoiceMetrics
 
     def to_json(self) -> dict[str, int | float]:
-        """Parameters and figures by name."""
-        return {**asdict(self.parameters), **self.figures.to_json()}
+        """Parameters and metrics by name."""
+        return {**asdict(self.parameters), **self.metrics.to_json()}
 
 
 def fit_pipeline(
@@ -80,7 +80,7 @@ def fit_pipeline(
         parameters: Of the fit.
 
     Returns:
-        The fitted pipeline; its `classes_` are those that occur.
+        The fitted pipeline; its `classes_` are those in `labels`.
 
     Raises:
         UsageError: All samples are of one class, or their features do not differ.
@@ -97,10 +97,8 @@ def _prepare(features: npt.ArrayLike, components: int) -> tuple[Pipeline, FloatA
 
     rows = np.asarray(features, dtype=np.float64)
     if not (rows != rows[:1]).any():
-        raise UsageError(
-            "all samples to train on have the same features; generate hits that differ"
-        )
-    # The covariance is exact, and quick where there are more samples than features.
+        raise UsageError("all training samples have the same features; generate hits that differ")
+    # Exact, and fast if there are more samples than features.
     axes = PCA(min(components, *rows.shape), svd_solver="covariance_eigh")
     ahead = Pipeline([("scale", StandardScaler()), ("components", axes)])
     return ahead, ahead.fit_transform(rows)
@@ -113,8 +111,8 @@ def _fit_machine(
     from sklearn.svm import SVC
 
     if len(np.unique(labels)) < 2:
-        raise UsageError("all samples to train on are of one class; expected at least two")
-    # As scikit-learn's "scale" has it.
+        raise UsageError("all training samples are of one class; expected at least two classes")
+    # As in scikit-learn's "scale".
     spread = float(reduced.var()) * reduced.shape[1]
     machine = SVC(
         kernel="poly",
@@ -135,18 +133,18 @@ def cross_validate(
     carry_on: int,
     grid: Sequence[Parameters],
     progress: Progress,
-) -> list[Tried]:
-    """Try parameters: fit on all folds but one, judge by that one, and so for each fold.
+) -> list[TriedParameters]:
+    """Cross-validate parameters: fit on all folds but one, measure on that one, for each fold.
 
     Args:
         samples: The samples.
         folds: (n,) the fold of each.
-        carry_on: The class to carry on.
+        carry_on: The class "no reaction".
         grid: The parameters to try.
-        progress: Told how many fits are done.
+        progress: Called with the number of fits done.
 
     Returns:
-        What was found of each, in the order given.
+        The results, in the order of `grid`.
     """
     count = int(folds.max()) + 1
     most = min(3, len(np.unique(samples.labels)))
@@ -162,7 +160,7 @@ def cross_validate(
             pipeline = _fit_machine(ahead, reduced, samples.labels[inside], parameters)
             predictor = PairwiseQuadratic.from_pipeline(pipeline)
             best = predictor.rank(samples.features[outside], min(most, predictor.classes))
-            # Where a fold lacks a class there can be one less to rank.
+            # If a fold lacks a class, there can be one less to rank.
             best = np.pad(best, ((0, 0), (0, most - best.shape[1])), mode="edge")
             ranked[parameters][outside] = pipeline.classes_[best]
             done += 1
@@ -172,35 +170,35 @@ def cross_validate(
         choices = in_use(
             ranked[parameters], samples.errors, samples.grazes, carry_on, samples.carry_on_limit
         )
-        tried.append(Tried(parameters, measure(choices, samples.labels, samples.errors)))
+        tried.append(TriedParameters(parameters, measure(choices, samples.labels, samples.errors)))
     return tried
 
 
-def by_merit(tried: Sequence[Tried]) -> list[Tried]:
-    """Parameters in the order of their merit, of equal ones the first first.
+def best_first(tried: Sequence[TriedParameters]) -> list[TriedParameters]:
+    """Sort results, best first; ties keep their order.
 
-    Accuracies that differ from the best by no more than its standard error count as equal; of
-    these the least regret comes first. Then come the others, by accuracy.
+    Accuracies within one standard error of the best count as equal; among these the least regret
+    comes first. Then come the others, by accuracy.
     """
-    best = max(item.figures.accuracy for item in tried)
-    slack = np.sqrt(best * (1.0 - best) / tried[0].figures.samples)
+    best = max(item.metrics.accuracy for item in tried)
+    slack = np.sqrt(best * (1.0 - best) / tried[0].metrics.samples)
 
-    def key(item: Tried) -> tuple[bool, float]:
-        worse = item.figures.accuracy < best - slack
-        return worse, -item.figures.accuracy if worse else item.figures.regret
+    def key(item: TriedParameters) -> tuple[bool, float]:
+        worse = item.metrics.accuracy < best - slack
+        return worse, -item.metrics.accuracy if worse else item.metrics.regret
 
     return sorted(tried, key=key)
 
 
-def watched(work: Callable[[], Result], tell: Callable[[], None]) -> Result:
-    """Do long work in a thread of its own, so that it can be told of, and interrupted.
+def run_in_thread(work: Callable[[], Result], tell: Callable[[], None]) -> Result:
+    """Do long work in a thread, so that progress can be shown and control-C works.
 
     Args:
-        work: What to do.
+        work: The work.
         tell: Called about twice a second meanwhile.
 
     Returns:
-        What the work returns; raises what it raises.
+        The result of `work`; its exceptions are raised here.
     """
     results: list[Result] = []
     errors: list[BaseException] = []
@@ -213,12 +211,12 @@ def watched(work: Callable[[], Result], tell: Callable[[], None]) -> Result:
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
-    told = time.monotonic()
+    last = time.monotonic()
     while thread.is_alive():
         thread.join(_TELL_S)
-        if time.monotonic() - told >= _TELL_S:
+        if time.monotonic() - last >= _TELL_S:
             tell()
-            told = time.monotonic()
+            last = time.monotonic()
     if errors:
         raise errors[0]
     return results[0]

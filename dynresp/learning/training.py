@@ -1,4 +1,4 @@
-"""Training a classifier on a dataset."""
+"""Train a classifier on a dataset."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from dynresp.learning.holdout import Split
 from dynresp.learning.labelled_samples import Labelled, groups_of, labelled
 from dynresp.learning.svm_fitting import (
     Parameters,
-    Tried,
-    by_merit,
+    TriedParameters,
+    best_first,
     cross_validate,
     fit_pipeline,
-    watched,
+    run_in_thread,
 )
 from dynresp.response.prediction.classifier import GROUPINGS, Classifier, TrainedFor, TrainedOn
 from dynresp.response.prediction.compiled_classifier import PairwiseQuadratic
@@ -33,8 +33,17 @@ from dynresp.support.progress import Progress
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
 
-# Settings that come after the choice, and change no label.
+# Settings that act after the choice, and so change no label.
 _AFTERWARDS = ("blend_s", "second_pass", "carry_on_s")
+
+
+FOLDS = 3
+"""Folds of the cross-validation."""
+SEARCHED_SAMPLES = 6_000
+"""All parameters are tried on at most this many samples."""
+FINALISTS = 4
+"""So many of the best parameters are tried again on four times as many samples, if there are as
+many: the best parameters for few samples need not be the best for many."""
 
 
 @dataclass(frozen=True)
@@ -44,17 +53,13 @@ class TrainConfig:
     Attributes:
         vector: The feature vector, "large" or "small".
         slices_s: Which slices of it [s].
-        grouping: What a class stands for, one of `GROUPINGS`.
-        samples: How many samples to train on at most; None for all that are not held out.
+        grouping: Classes, one of `GROUPINGS`: reactions or strategies.
+        samples: Train on at most this many samples; None for all that are not held out.
         split: Which samples are held out.
         components: Principal components to try for the exact model.
         penalties: Values of C to try.
-        gamma_factors: Values of gamma to try, in terms of scikit-learn's "scale".
+        gamma_factors: Values of gamma to try, as multiples of scikit-learn's "scale".
         reduced_components: Principal components of the reduced model.
-        folds: Of the cross-validation.
-        searched_samples: How many samples to try all parameters on at most.
-        finalists: How many of the best are tried once more, on four times as many samples where
-            there are as many: what suits few samples need not suit many.
     """
 
     vector: str = "large"
@@ -66,15 +71,12 @@ class TrainConfig:
     penalties: tuple[float, ...] = (1.0, 10.0, 100.0)
     gamma_factors: tuple[float, ...] = (0.5, 1.0)
     reduced_components: int = 32
-    folds: int = 3
-    searched_samples: int = 6_000
-    finalists: int = 4
 
     def __post_init__(self) -> None:
         """Check what can be checked without data.
 
         Raises:
-            UsageError: A value makes no sense; the message names it.
+            UsageError: A value is out of range; the message names it.
         """
         if self.grouping not in GROUPINGS:
             raise UnknownNameError("grouping of classes", self.grouping, GROUPINGS)
@@ -84,20 +86,20 @@ class TrainConfig:
         grids = (self.components, self.penalties, self.gamma_factors)
         if any(not values or min(values) <= 0 for values in grids):
             raise UsageError("components, penalties and gamma_factors need values above 0")
-        least = {"reduced_components": 1, "folds": 2, "searched_samples": 4, "finalists": 1}
-        for name, value in least.items():
-            if getattr(self, name) < value:
-                raise UsageError(f"{name} must be at least {value}, got {getattr(self, name)}")
+        if self.reduced_components < 1:
+            raise UsageError(
+                f"reduced_components must be at least 1, got {self.reduced_components}"
+            )
 
     def grid(self, features: int) -> list[Parameters]:
-        """All parameters to try, none twice where there are fewer features than components."""
+        """All parameters to try, without duplicates if there are fewer features than components."""
         components = dict.fromkeys(min(k, features) for k in self.components)
         return [Parameters(*p) for p in product(components, self.penalties, self.gamma_factors)]
 
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """What training gives.
+    """A trained classifier.
 
     Attributes:
         classifier: The classifier.
@@ -114,10 +116,10 @@ def train(dataset: Dataset, config: TrainConfig, progress: Progress) -> Trained:
     Args:
         dataset: Labelled hits.
         config: How.
-        progress: Told the stage, how many are done, and of how many.
+        progress: Called with stage, number done, and number in all.
 
     Returns:
-        The classifier and what it was compiled from.
+        The classifier, and the pipelines that it was compiled from.
 
     Raises:
         UsageError: There are too few samples, or too few classes among them.
@@ -129,15 +131,15 @@ def train(dataset: Dataset, config: TrainConfig, progress: Progress) -> Trained:
     columns = vector_columns(config.vector, config.slices_s)
     usable = labelled(dataset, groups, columns)
     learning = usable.take(config.split.trained(usable.index, config.samples))
-    _check_enough(learning, groups, len(dataset), config)
+    _check_enough(learning, groups, len(dataset))
 
-    # One thread: the same bits whatever the number of cores; and where others are at work, many
-    # small matrices cost several threads a hundred times as much.
+    # One thread: the same bits on any number of cores; and on a busy machine, many small matrices
+    # take several threads a hundred times as long.
     with threadpool_limits(limits=1):
         tried = _search(learning, groups.carry_on, config, progress)
-        models = _fit_models(learning, by_merit(tried[-1])[0].parameters, config, progress)
+        models = _fit_models(learning, best_first(tried[-1])[0].parameters, config, progress)
 
-    progress("judging", 0, 1)
+    progress("evaluating", 0, 1)
     held_out = usable.take(config.split.is_held_out(usable.index))
     present = models["exact"].pipeline.classes_
     choices = {name for own in present for name in groups.members[own]}
@@ -165,38 +167,38 @@ def train(dataset: Dataset, config: TrainConfig, progress: Progress) -> Trained:
         facts={
             "vector": config.vector,
             "slices_s": sorted({float(name.partition("/")[0]) for name in names}),
-            "plan": facts.plan["plan"]["name"],
+            "plan": facts.spec["plan"]["name"],
             "bases": list(facts.bases),
             "left_out": len(dataset) - len(usable),
             "samples_per_class": dict(zip(groups.names, counts.tolist(), strict=True)),
             "models": {
-                name: {**model.about(), "held_out": model.judged(held_out, groups.carry_on)}
+                name: {**model.about(), "held_out": model.metrics(held_out, groups.carry_on)}
                 for name, model in models.items()
             },
             "cross_validation": {
-                "folds": config.folds,
+                "folds": FOLDS,
                 "rounds": [[item.to_json() for item in tries] for tries in tried],
             },
             "training_s": round(time.perf_counter() - began, 2),
         },
     )
-    progress("judging", 1, 1)
+    progress("evaluating", 1, 1)
     return Trained(classifier, {name: model.pipeline for name, model in models.items()})
 
 
 def _search(
     learning: Labelled, carry_on: int, config: TrainConfig, progress: Progress
-) -> list[list[Tried]]:
-    """Cross-validate all parameters on some samples, then the best on more, if there are more."""
+) -> list[list[TriedParameters]]:
+    """Cross-validate all parameters on some samples, then the best ones on more samples."""
     grid = config.grid(learning.features.shape[1])
-    size, rounds = config.searched_samples, []
+    size, rounds = SEARCHED_SAMPLES, []
     while True:
         some = learning.take(config.split.searched(learning.index, size))
-        folds = config.split.folds(some.index, some.labels, config.folds)
+        folds = config.split.folds(some.index, some.labels, FOLDS)
         rounds.append(cross_validate(some, folds, carry_on, grid, progress))
         if len(rounds) == 2 or len(learning) <= size:
             return rounds
-        grid = [item.parameters for item in by_merit(rounds[-1])[: config.finalists]]
+        grid = [item.parameters for item in best_first(rounds[-1])[:FINALISTS]]
         size *= 4
 
 
@@ -221,8 +223,8 @@ class _Model:
             "fit_s": round(self.fit_s, 2),
         }
 
-    def judged(self, samples: Labelled, carry_on: int) -> dict[str, Any] | None:
-        """Figures on samples that were held out; None where there are none."""
+    def metrics(self, samples: Labelled, carry_on: int) -> dict[str, Any] | None:
+        """Metrics on held-out samples; None if there are none."""
         if not len(samples):
             return None
         most = min(3, self.predictor.classes)
@@ -237,14 +239,14 @@ class _Model:
 def _fit_models(
     learning: Labelled, best: Parameters, config: TrainConfig, progress: Progress
 ) -> dict[str, _Model]:
-    """The exact model, and the reduced one with the same parameters but for its components."""
+    """The exact model, and the reduced one: the same parameters with fewer components."""
     fewer = replace(best, components=min(config.reduced_components, best.components))
     models = {}
     for done, (name, parameters) in enumerate((("exact", best), ("reduced", fewer))):
         stage = f"fitting the {name} model to {len(learning)} samples"
         progress(stage, done, 2)
         began = time.perf_counter()
-        pipeline = watched(
+        pipeline = run_in_thread(
             partial(fit_pipeline, learning.features, learning.labels, parameters),
             partial(progress, stage, done, 2),
         )
@@ -256,13 +258,13 @@ def _fit_models(
     return models
 
 
-def _check_enough(learning: Labelled, groups: Groups, count: int, config: TrainConfig) -> None:
-    """Refuse samples that a classifier cannot be learnt from."""
+def _check_enough(learning: Labelled, groups: Groups, count: int) -> None:
+    """Refuse too few samples or classes."""
     counts = np.bincount(learning.labels, minlength=len(groups.names))
-    if np.count_nonzero(counts >= config.folds) >= 2:
+    if np.count_nonzero(counts >= FOLDS) >= 2:
         return
     seen = ", ".join(f"{n} {name}" for name, n in zip(groups.names, counts, strict=True) if n)
     raise UsageError(
-        f"a classifier needs at least two classes with {config.folds} samples or more; of {count} "
-        f"samples there are to train on: {seen or 'none'}. Generate more, of impacts that differ."
+        f"a classifier needs at least two classes with {FOLDS} samples or more; of {count} samples "
+        f"there are to train on: {seen or 'none'}. Generate more samples of different impacts."
     )

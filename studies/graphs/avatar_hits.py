@@ -25,11 +25,11 @@ from dynresp.support.arrays import BoolArray
 from studies.graphs.graph_study import FLAT, of_graphs
 from studies.study import Columns, Options, Study, Target, Value
 
-# Each avatar is hit about so many times: as many returns of it are remembered, and more.
+# About how many times each avatar is hit; an avatar remembers more returns than that.
 _HITS_EACH = 30
-# From one hit to the next of an avatar, and after the last until all are looked at [s].
+# Time from one hit of an avatar to the next, and from the last hit to the end [s].
 _BETWEEN_S, _REST_S = (2.0, 5.0), 8.0
-# An avatar whose root goes less than this in the last seconds stands there [m].
+# An avatar whose root moves less than this in the last seconds stands still [m].
 _MOVED_M, _LAST_S = 0.05, 3.0
 _TARGETS = ("chest", "head", "pelvis", "left_thigh", "right_upper_arm")
 
@@ -41,7 +41,7 @@ def measure(
     seed: int,
     folders: Sequence[Path] | None = None,
 ) -> dict[str, Value]:
-    """Let avatars walk by chance and hit them; reactions are those of the default library.
+    """Hit avatars on random walks; reactions are those of the default library.
 
     Args:
         graph: The graph.
@@ -63,8 +63,8 @@ def measure(
     roots, hit, broken = _hit(crowd, count, np.random.default_rng(seed), fps)
     seconds = time.perf_counter() - start
     simulated_s = len(roots) * avatars / fps
-    became = Counter(what for avatar in crowd.avatars for what in _became(avatar))
-    entered = became["carried on"] + became["reacted"]
+    outcomes = Counter(what for avatar in crowd.avatars for what in _outcomes(avatar))
+    entered = outcomes["carried on"] + outcomes["reacted"]
     last = np.ptp(roots[-round(_LAST_S * fps) :, :, :2], axis=0).max(axis=1)
     walking = np.array([avatar.activity is Activity.WALKING for avatar in crowd.avatars])
     staying = np.array([avatar.activity is Activity.STAYING for avatar in crowd.avatars])
@@ -73,11 +73,11 @@ def measure(
         "avatars": avatars,
         "hits_thrown": count,
         "frames_not_finite": broken,
-        "answered": entered + became["stayed"],
-        "carried_on": became["carried on"],
-        "reacted": became["reacted"],
-        "stayed_down": became["stayed"],
-        "walked_on": entered / max(entered + became["stayed"], 1),
+        "answered": entered + outcomes["stayed"],
+        "carried_on": outcomes["carried on"],
+        "reacted": outcomes["reacted"],
+        "stayed_down": outcomes["stayed"],
+        "walked_on": entered / max(entered + outcomes["stayed"], 1),
         "walking_at_the_end": float(np.mean(walking)),
         "moving_at_the_end": float(np.mean(last[walking] > _MOVED_M)) if walking.any() else 0.0,
         "stuck": int(np.count_nonzero(~walking & ~staying)),
@@ -87,7 +87,7 @@ def measure(
 
 
 def some_impact(rng: np.random.Generator) -> Impact:
-    """A ball, a push or a punch of any strength that a responder is made for."""
+    """A random ball, push or punch, within the strengths that responders are made for."""
     from_deg = float(rng.uniform(0.0, 360.0))
     kind = rng.integers(3)
     if kind == 0:
@@ -103,11 +103,11 @@ def some_impact(rng: np.random.Generator) -> Impact:
 def _hit(
     crowd: AvatarCrowd, count: int, rng: np.random.Generator, fps: float
 ) -> tuple[FloatArray, BoolArray, int]:
-    """Hit avatars until there were so many hits, then let all end.
+    """Hit avatars until there were enough hits, then let all end.
 
     Returns:
-        (frames, avatars, 3) roots, (frames, avatars) whether each is being hit, and how many
-        poses are not finite.
+        (frames, avatars, 3) roots, (frames, avatars) whether each reacts to a hit, and the
+        number of poses that are not finite.
     """
     least, most = round(_BETWEEN_S[0] * fps), round(_BETWEEN_S[1] * fps)
     due = rng.integers(round(fps), most, len(crowd.avatars))
@@ -129,8 +129,8 @@ def _hit(
     return np.array(roots), np.array(hit), broken
 
 
-def _became(avatar: Avatar) -> list[str]:
-    """What became of the hits that were answered."""
+def _outcomes(avatar: Avatar) -> list[str]:
+    """What the avatar did after each hit: stayed, carried on or reacted."""
     return [
         "stayed"
         if back.moment is None
@@ -149,36 +149,36 @@ def _returns(
     hit: BoolArray,
     fps: float,
 ) -> dict[str, Value]:
-    """How long it took to come back into the graph, and how far the root leapt there."""
+    """Times until the graph is entered again, and steps of the root there."""
     usual = max(
         float(np.percentile(np.linalg.norm(graph.database.velocities[:, :3], axis=1), 99.9)) / fps,
-        max(float(np.percentile(_ways(r.motion.poses[:, ROOT]), 99.9)) for r in library.reactions),
+        max(float(np.percentile(_steps(r.motion.poses[:, ROOT]), 99.9)) for r in library.reactions),
     )
-    waits, leaps = [], []
+    waits, largest_steps = [], []
     for k, avatar in enumerate(crowd.avatars):
-        ways = _ways(roots[:, k])
+        steps = _steps(roots[:, k])
         free = ~(hit[1:, k] | hit[:-1, k])
         for back in avatar.returns:
             if back.moment is not None:
                 waits.append((back.moment - back.decided) / fps)
                 # The first frame that is shown is frame 1 of the clock.
                 second = slice(max(back.moment - 1, 0), back.moment - 1 + round(fps))
-                leaps.append(float(ways[second][free[second]].max(initial=0.0)))
+                largest_steps.append(float(steps[second][free[second]].max(initial=0.0)))
     if not waits:
         return {}
     return {
         "back_after_median_s": float(np.median(waits)),
         "back_after_largest_s": max(waits),
         "root_step_recorded_p99.9_m": usual,
-        "root_step_entering_p99_m": float(np.percentile(leaps, 99.0)),
-        "root_step_entering_largest_m": max(leaps),
+        "root_step_entering_p99_m": float(np.percentile(largest_steps, 99.0)),
+        "root_step_entering_largest_m": max(largest_steps),
     }
 
 
-def _ways(track: FloatArray) -> FloatArray:
-    """(n - 1,) how far it is from each place (n, 3) to the next [m]."""
-    ways: FloatArray = np.linalg.norm(np.diff(track, axis=0), axis=1)
-    return ways
+def _steps(track: FloatArray) -> FloatArray:
+    """(n - 1,) distances from each position (n, 3) to the next [m]."""
+    steps: FloatArray = np.linalg.norm(np.diff(track, axis=0), axis=1)
+    return steps
 
 
 def _measured(options: Options) -> Columns:
@@ -200,7 +200,7 @@ STUDY = Study(
     notes=(
         "Balls, pushes and punches at avatars on random walks, 2 to 5 s after each other; "
         "walked_on is the share of the answers after which the graph was entered again.",
-        "root_step: the root's way from one frame to the next in the second after the graph is "
-        "entered.",
+        "root_step: how far the root moves from one frame to the next in the second after the "
+        "graph is entered.",
     ),
 )

@@ -21,8 +21,8 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
     Args:
         graph: The graph.
         character: The character.
-        count: Random starts.
-        seed: Of these.
+        count: Number of random starts.
+        seed: Of the random starts.
     """
     from threadpoolctl import threadpool_limits
 

@@ -1,4 +1,4 @@
-"""What shows of transitions: how feet slide, and how speeds leap at jumps, before and after."""
+"""How far feet slide, and how speeds change at jumps, before and after fitting."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from studies.graphs.speed_steps import COLUMNS, UNITS, at_jumps, source_limits, 
 from studies.study import Study, Target, Value
 
 SLIDE_M = 0.01
-"""A foot that slides less in a stance stands [m]."""
+"""A foot that slides less than this in a stance counts as standing [m]."""
 CUT, BLENDED, FITTED = STAGES = ("cut", "blended", "fitted")
 SHOWN_FPS = 30.0
 """Frame rate of the motions that are written."""
@@ -29,7 +29,7 @@ _STRETCH = 25_000
 
 
 def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
-    """Walk by chance, and look at stances and jumps.
+    """Measure stances and jumps of a random walk.
 
     Args:
         graph: The graph.
@@ -41,7 +41,7 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
         UsageError: The walk is too short to hold a stance and a jump.
     """
     path = random_walk(graph, count, np.random.default_rng(seed))
-    own, shown = (_Seen.of(graph, character, path, fps) for fps in (graph.config.fps, SHOWN_FPS))
+    own, shown = (_Stages.of(graph, character, path, fps) for fps in (graph.config.fps, SHOWN_FPS))
     slides, steps = own.slides, own.steps
     if not (own.whole and shown.whole):
         raise UsageError(f"{count} frames hold no stance or no jump; give a larger --count")
@@ -63,20 +63,20 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """What was seen of a walk, by the stage: slides [m] of stances, and speed steps at jumps."""
+class _Stages:
+    """Of a walk, by stage: slides of the feet in stances [m], and speed steps at jumps."""
 
     slides: dict[str, FloatArray]
     steps: dict[str, FloatArray]
 
     @property
     def whole(self) -> bool:
-        """Whether a stance and a jump were seen."""
+        """Whether there is a stance and a jump."""
         return all(len(rows.get(FITTED, ())) for rows in (self.slides, self.steps))
 
     @classmethod
-    def of(cls, graph: MotionGraph, character: Character, path: IntArray, fps: float) -> _Seen:
-        """Compose a walk at a frame rate, and look at it; cut only at the graph's own."""
+    def of(cls, graph: MotionGraph, character: Character, path: IntArray, fps: float) -> _Stages:
+        """Compose a walk at a frame rate and measure it; `cut` only at the graph's rate."""
         slides: dict[str, list[float]] = {stage: [] for stage in STAGES}
         steps: dict[str, list[FloatArray]] = {stage: [] for stage in STAGES}
         rate = fps / graph.config.fps
@@ -90,25 +90,25 @@ class _Seen:
                 slides[stage] += stance_slides(motion, character)
                 steps[stage].append(at_jumps(motion, made.jumps, rate))
         return cls(
-            {stage: np.array(ways) for stage, ways in slides.items() if ways},
+            {stage: np.array(values) for stage, values in slides.items() if values},
             {stage: np.concatenate(rows) for stage, rows in steps.items() if rows},
         )
 
 
 def _of_slides(slides: dict[str, FloatArray]) -> dict[str, Value]:
-    """Shares and sizes, by the stage."""
+    """Shares and sizes of slides, by stage."""
     figures: dict[str, Value] = {}
     for stage in (BLENDED, FITTED):
-        ways = slides[stage]
-        figures[f"slide_{stage}_under_1_cm"] = float(np.mean(ways < SLIDE_M))
-        figures[f"slide_{stage}_median_mm"] = 1e3 * float(np.median(ways))
-        figures[f"slide_{stage}_p99_mm"] = 1e3 * float(np.percentile(ways, 99.0))
-        figures[f"slide_{stage}_largest_mm"] = 1e3 * float(ways.max())
+        values = slides[stage]
+        figures[f"slide_{stage}_under_1_cm"] = float(np.mean(values < SLIDE_M))
+        figures[f"slide_{stage}_median_mm"] = 1e3 * float(np.median(values))
+        figures[f"slide_{stage}_p99_mm"] = 1e3 * float(np.percentile(values, 99.0))
+        figures[f"slide_{stage}_largest_mm"] = 1e3 * float(values.max())
     return figures
 
 
 def _of_steps(steps: dict[str, FloatArray], limits: FloatArray) -> dict[str, Value]:
-    """Limits, and for each stage how many are below and how large the largest is."""
+    """Limits, and for each stage the share below and the 99.9th percentile."""
     figures: dict[str, Value] = {}
     for k, (name, unit) in enumerate(zip(COLUMNS, UNITS, strict=True)):
         figures[f"{name}_step_recorded_p99.9_{unit}"] = float(limits[k])

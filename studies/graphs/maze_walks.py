@@ -1,6 +1,6 @@
 """Walks through random mazes: along a rough sketch, and with the goal alone given.
 
-A sketch wavers about the way through the maze by a third of a metre, and may cut its walls.
+A sketch deviates from the path through the maze by about 0.3 m, and may cross its walls.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from studies.graphs.graph_study import FLAT, of_graphs
 from studies.graphs.sketched_paths import real_time_ratios, standing_on, warm_up
 from studies.study import Study, Target, Value
 
-# Distance of the places through which a sketch wavers [m], and by how much (standard deviation).
-_APART_M, _WAVERS_M = 0.9, 0.3
+# Distance of the points of a sketch [m], and their deviation (standard deviation) [m].
+_SPACING_M, _DEVIATION_M = 0.9, 0.3
 _CORNERS = 200
-# The body is looked at so often [1/s].
-_LOOKS_PER_S = 60.0
+# Poses that are measured, per second.
+_FPS = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Walked:
 
     Attributes:
         maze: The maze.
-        walk: What came of it.
+        walk: The walk.
     """
 
     maze: Maze
@@ -44,11 +44,11 @@ class Walked:
 
 
 def rough_sketch(rng: np.random.Generator, maze: Maze) -> FloatArray:
-    """(k, 2) corners of a wavering line along the solution of a maze [m]."""
+    """(k, 2) corners of an inexact line along the solution of a maze [m]."""
     from scipy.interpolate import CubicSpline
 
-    places = resampled(maze.solution, _APART_M)
-    moved = places + rng.normal(0.0, _WAVERS_M, places.shape)
+    places = resampled(maze.solution, _SPACING_M)
+    moved = places + rng.normal(0.0, _DEVIATION_M, places.shape)
     moved[[0, -1]] = places[[0, -1]]
     at = np.linspace(0, len(moved) - 1, _CORNERS)
     return np.asarray(CubicSpline(np.arange(len(moved)), moved)(at))
@@ -58,10 +58,10 @@ def walk_mazes(search: SearchGraph, count: int, seed: int, sketched: bool) -> li
     """Walk through random mazes from corner to corner.
 
     Args:
-        search: The graph that is walked through.
-        count: How many mazes.
+        search: The graph.
+        count: Number of mazes.
         seed: Of mazes and sketches.
-        sketched: Whether a sketch is given; otherwise the goal alone.
+        sketched: With a sketch; else with the goal alone.
     """
     out = []
     for k in range(count):
@@ -78,14 +78,14 @@ def walk_mazes(search: SearchGraph, count: int, seed: int, sketched: bool) -> li
 
 
 def clearance(graph: MotionGraph, character: Character, walked: Walked) -> float:
-    """How near the body comes to a wall, feet fitted, sixty times a second [m]."""
+    """Least distance of the body to a wall, feet fitted, sixty times a second [m]."""
     walk = walked.walk
-    motion = compose(graph, character, walk.frames, walk.placements[0], _LOOKS_PER_S).motion
+    motion = compose(graph, character, walk.frames, walk.placements[0], _FPS).motion
     return float(body_clearances(walked.maze.world, character, motion.poses).min())
 
 
 def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
-    """Walk through random mazes both ways.
+    """Walk through random mazes, with a sketch and with the goal alone.
 
     Args:
         graph: The graph.

@@ -1,4 +1,4 @@
-"""A million frames by chance: whether a walk ever ends, and how fast it is made."""
+"""A million frames of a random walk: whether it ever ends, and how fast it is made."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _STRETCH, _WARM = 25_000, 300
 
 
 def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
-    """Walk by chance, play it, and fit its feet where the ground is level.
+    """Make a random walk, play it, and fit its feet on level ground.
 
     Args:
         graph: The graph.
@@ -63,16 +63,16 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
 
 
 def off_the_graph(graph: MotionGraph, path: IntArray) -> int:
-    """How many steps of a walk are no ways of the graph."""
+    """How many steps of a walk are not edges of the graph."""
     n = len(graph.database)
-    ways = np.sort(graph.sources.astype(np.int64) * n + graph.targets)
+    edges = np.sort(graph.sources.astype(np.int64) * n + graph.targets)
     steps = path[:-1].astype(np.int64) * n + path[1:]
-    at = np.searchsorted(ways, steps).clip(0, len(ways) - 1)
-    return int(np.count_nonzero(ways[at] != steps))
+    at = np.searchsorted(edges, steps).clip(0, len(edges) - 1)
+    return int(np.count_nonzero(edges[at] != steps))
 
 
 def _played(graph: MotionGraph, path: IntArray) -> tuple[float, int]:
-    """How long a walk takes to play [s], and how many of its frames are not finite."""
+    """The time to play a walk [s], and how many of its frames are not finite."""
     playback = Playback(graph, int(path[0]))
     seconds, broken = 0.0, 0
     for at in range(1, len(path), _STRETCH):

@@ -1,4 +1,4 @@
-"""Choices at random moments: how many there are, and how long they take."""
+"""Actions offered at random moments: how many, and how long a choice takes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from studies.graphs.graph_study import of_graphs
 from studies.study import Study, Target, Value
 
 ENOUGH, WITHIN_MS = 3, 5.0
-"""As many actions are to be offered, in so much time."""
-# Frames from moment to moment of a walk.
-_APART = 11
+"""Actions that have to be offered, and the time limit."""
+# Frames from one moment to the next.
+_SPACING = 11
 
 
 def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
-    """Ask for choices at moments of a walk by chance.
+    """Choose at moments of a random walk.
 
     Args:
         graph: The graph.
@@ -35,10 +35,10 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
     clustered = time.perf_counter()
     forest = ClusterForest(graph, clusters)
     grown = time.perf_counter()
-    walk = random_walk(graph, _APART * count, np.random.default_rng(seed))
+    walk = random_walk(graph, _SPACING * count, np.random.default_rng(seed))
     offer_actions(forest, int(walk[0]))
     took, busy, found = np.empty(count), np.empty(count), np.empty(count, dtype=int)
-    for k, frame in enumerate(walk[::_APART].tolist()):
+    for k, frame in enumerate(walk[::_SPACING].tolist()):
         begun, used = time.perf_counter(), time.thread_time()
         offered = offer_actions(forest, frame)
         busy[k] = 1e3 * (time.thread_time() - used)
@@ -62,7 +62,7 @@ def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> 
 
 
 def _end(choice: OfferedAction) -> tuple[float, ...]:
-    """What makes an action another one: where it ends, how it faces, and in which cluster."""
+    """Actions differ in where they end, in which direction and in which cluster."""
     x, y, _, yaw = choice.path[-1].tolist()
     return (x, y, yaw, choice.cluster)
 

@@ -9,13 +9,13 @@ from studies.study import Study, Value
 
 
 def measure(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
-    """Tell what was counted when the graph was built.
+    """Counts from the building of the graph.
 
     Args:
         graph: The graph.
-        character: Not asked for.
-        count: Not asked for.
-        seed: Not asked for.
+        character: Not used.
+        count: Not used.
+        seed: Not used.
     """
     counts = graph.counts
     return {

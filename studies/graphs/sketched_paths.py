@@ -1,7 +1,7 @@
-"""Walks along sketches: how near they keep to random smooth paths, and how long they take to plan.
+"""Walks along sketches: distance to random smooth paths, and planning time.
 
 The paths are 20 m long, on open ground, with random bends of more than a metre's radius. Every
-other walk is to end standing.
+other walk has to end standing.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LENGTH_M, BEND_PER_M = 20.0, 0.8
 # Corners of a path, and over how many of them bends are smoothed (standard deviation).
 _CORNERS, _SMOOTH = 400, 30
 # How far along a path the avatar faces at first [corners]: a quarter of a metre.
-_FACED = 5
+_FACED_CORNER = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Followed:
 
     Attributes:
         path: (k, 2) its corners [m].
-        stop: Whether it was to end standing.
-        walk: What came of it.
+        stop: Whether the walk has to end standing.
+        walk: The walk.
     """
 
     path: FloatArray
@@ -48,27 +48,27 @@ def smooth_path(rng: np.random.Generator) -> FloatArray:
     """(k, 2) corners of a random smooth path that begins at the origin [m]."""
     from scipy.ndimage import gaussian_filter1d
 
-    # What the filter makes up at both ends is left out.
+    # Both ends are cut off: the filter has no data beyond them.
     rim, step = 100, LENGTH_M / _CORNERS
     bend = gaussian_filter1d(rng.normal(0.0, 1.0, _CORNERS + 2 * rim), _SMOOTH)[rim:-rim]
     bend *= BEND_PER_M * rng.random() / np.abs(bend).max()
     heading = rng.uniform(-np.pi, np.pi) + np.cumsum(bend) * step
-    ways = step * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    return np.concatenate([[(0.0, 0.0)], np.cumsum(ways, axis=0)])
+    steps = step * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    return np.concatenate([[(0.0, 0.0)], np.cumsum(steps, axis=0)])
 
 
 def follow_smooth_paths(search: SearchGraph, count: int, seed: int) -> list[Followed]:
     """Walk along random smooth paths.
 
     Args:
-        search: The graph that is walked through.
-        count: How many paths.
+        search: The graph.
+        count: Number of paths.
         seed: Of the paths.
     """
     out = []
     for k in range(count):
         path, stop = smooth_path(np.random.default_rng([seed, k])), k % 2 == 1
-        start = standing_on(search.graph, path, _FACED)
+        start = standing_on(search.graph, path, _FACED_CORNER)
         out.append(
             Followed(path, stop, follow_sketch(search, start, path, config=SketchConfig(stop=stop)))
         )

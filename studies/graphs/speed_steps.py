@@ -1,4 +1,4 @@
-"""How suddenly a motion changes its speed: at the jumps of a walk, and in what was recorded."""
+"""How suddenly a motion changes its speed: at the jumps of a walk, and in the recordings."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.response.response_quality import joint_speed_steps
 
 COLUMNS = ("joint", "root", "turn")
-"""What changes its speed: the joint that changes most, the root, and the root's turning."""
+"""Quantities: the joint whose speed changes most, the root, and the root's turning."""
 UNITS = ("rad_s", "m_s", "rad_s")
 QUANTILE = 99.9
-"""Percentile of the speed steps of what was recorded that a jump is compared with."""
+"""Percentile of the recorded speed steps that jumps are compared with."""
 
 
 def speed_steps(motion: Motion) -> FloatArray:
@@ -34,13 +34,13 @@ def speed_steps(motion: Motion) -> FloatArray:
 
 
 def source_limits(graph: MotionGraph) -> FloatArray:
-    """(3,) percentiles of the speed steps of what was recorded; see `COLUMNS`."""
+    """(3,) percentiles of the speed steps of the recordings; see `COLUMNS`."""
     clips = [graph.database.motion(clip) for clip in range(len(graph.database.clips))]
     return _percentiles(clips)
 
 
 def source_limits_at(graph: MotionGraph, character: Character, fps: float) -> FloatArray:
-    """The same of what was recorded, played at another frame rate."""
+    """The same for the recordings, played at another frame rate."""
     clips = []
     for clip in graph.database.clips:
         if clip.stop - clip.start > 1:

@@ -1,4 +1,4 @@
-"""How well feet and hands keep to their worlds: blocks drawn at random, and bars."""
+"""How well feet stand on random blocks, and hands hold bars."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ TERRAINS = 20
 ON_BLOCK_M = 0.01
 """A stance is on its block if its height is right and it hangs over no edge to within this [m]."""
 
-# Blocks along a side, and how far from the corners a way begins and ends [m].
+# Blocks along a side, and distance of start and goal to the corners [m].
 _SIDE, _CORNER_M = 20, 1.2
 _FPS = 60.0
 _PLAYED_FPS, _PLAYED_S = 30.0, 120.0
@@ -54,8 +54,8 @@ class Crossing:
 
     Attributes:
         terrain: The blocks.
-        walk: The way that was found.
-        motion: What came of it.
+        walk: The walk through the graph.
+        motion: Its motion, feet fitted.
         feet: How its feet stand.
     """
 
@@ -71,13 +71,13 @@ class Crossing:
         return int(np.count_nonzero(within))
 
 
-def cross(ways: TerrainGraph, seed: int, wander_s: float | None = None) -> Crossing:
+def cross(graph: TerrainGraph, seed: int, wander_s: float | None = None) -> Crossing:
     """Walk over a terrain of 20 x 20 blocks that is drawn from a seed, from corner to corner.
 
     Args:
-        ways: What is walked through.
+        graph: The graph to walk through.
         seed: Of the terrain.
-        wander_s: Wander about for so long instead [s].
+        wander_s: Wander for this time instead [s].
 
     Raises:
         UsageError: Nobody can stand in the corner.
@@ -85,24 +85,24 @@ def cross(ways: TerrainGraph, seed: int, wander_s: float | None = None) -> Cross
     rng = np.random.default_rng(seed)
     terrain = Terrain.random(rng, _SIDE, _SIDE)
     goal = np.array(terrain.size) - _CORNER_M
-    start = start_on_terrain(ways, terrain, [_CORNER_M, _CORNER_M], goal)
-    rate = ways.graph.config.fps
+    start = start_on_terrain(graph, terrain, [_CORNER_M, _CORNER_M], goal)
+    rate = graph.graph.config.fps
     if wander_s is None:
-        walk = reach_on_terrain(ways, terrain, start, goal)
+        walk = reach_on_terrain(graph, terrain, start, goal)
     else:
-        walk = wander_on_terrain(ways, terrain, start, round(wander_s * rate), rng)
-    motion = compose_on_terrain(ways, terrain, walk, _FPS).motion
+        walk = wander_on_terrain(graph, terrain, start, round(wander_s * rate), rng)
+    motion = compose_on_terrain(graph, terrain, walk, _FPS).motion
     blocks = walk_blocks(walk, rate, motion)
-    return Crossing(terrain, walk, motion, footing(ways.character, terrain, motion, blocks))
+    return Crossing(terrain, walk, motion, footing(graph.character, terrain, motion, blocks))
 
 
 def play(graph: MotionGraph, character: Character, seed: int) -> tuple[Grips, Grips, Motion]:
-    """Two minutes by chance through a playground.
+    """A random walk of two minutes through a playground.
 
     Args:
-        graph: What is walked through.
-        character: Whose body it is.
-        seed: Of where it begins and how it goes on.
+        graph: The graph.
+        character: The character.
+        seed: Of the random walk.
 
     Returns:
         How hands hold on before they are fitted, and after; and the fitted motion.
@@ -116,9 +116,9 @@ def play(graph: MotionGraph, character: Character, seed: int) -> tuple[Grips, Gr
 
 
 def _terrain(graph: MotionGraph, character: Character, count: int, seed: int) -> dict[str, Value]:
-    ways = TerrainGraph(graph, character)
-    crossed = [cross(ways, seed + k) for k in range(count)]
-    wandered = [cross(ways, seed + k, wander_s=30.0) for k in range(max(1, count // 4))]
+    terrain_graph = TerrainGraph(graph, character)
+    crossed = [cross(terrain_graph, seed + k) for k in range(count)]
+    wandered = [cross(terrain_graph, seed + k, wander_s=30.0) for k in range(max(1, count // 4))]
     found: dict[str, Value] = {"terrains": count}
     for name_of_walks, walks in (("crossing", crossed), ("wandering", wandered)):
         found |= {f"{name_of_walks}_{name}": value for name, value in _feet(walks).items()}

@@ -21,7 +21,7 @@ _STAGE_COLOURS = {
     "physics": GREY,
     "bodies": "#5f6770",
     "choice": GREEN,
-    "oracle": ORANGE,
+    "search": ORANGE,
     "rewind": RED,
 }
 

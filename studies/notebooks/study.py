@@ -20,8 +20,8 @@ import matplotlib as mpl
 import numpy as np
 
 from dynresp.datasets.dataset_reader import Dataset, load_dataset
-from dynresp.datasets.dataset_spec import DatasetPlan
-from dynresp.datasets.dataset_spec_reader import parse_plan
+from dynresp.datasets.dataset_spec import DatasetSpec
+from dynresp.datasets.dataset_spec_reader import parse_dataset_spec
 from dynresp.datasets.sample_draws import Sample, draw_sample
 from dynresp.learning.holdout import Split
 from dynresp.learning.training import TrainConfig, train
@@ -172,7 +172,7 @@ class Situation:
         config: Settings.
     """
 
-    plan: DatasetPlan
+    plan: DatasetSpec
     character: Character
     bases: tuple[Motion, ...]
     library: ReactionLibrary
@@ -207,7 +207,7 @@ def situation(name: str) -> Situation:
         UsageError: The dataset was made with another library than there is on this machine.
     """
     facts = dataset(name).facts
-    plan = parse_plan(dict(facts.plan))
+    plan = parse_dataset_spec(dict(facts.spec))
     character, config, beside = (
         default_character(),
         response_config(plan.settings),

@@ -50,7 +50,7 @@ class Filming:
 
 
 class Camera:
-    """A pinhole camera that sees all places where somebody goes."""
+    """A pinhole camera that sees all positions of a person."""
 
     def __init__(self, places: FloatArray, tall: float, rng: np.random.Generator, yaw: float):
         """Stand back far enough.
@@ -100,7 +100,7 @@ def film(
         motion: What is done, on the person's own skeleton.
         character: The person.
         filming: How it is filmed.
-        masks: Out, if given: where the person is, frame by frame.
+        masks: If given, gets the mask of the person for each frame.
 
     Yields:
         Pictures (height, width, 3), blue green red.
@@ -213,7 +213,7 @@ def _draw(
     frame: int,
     colors: list[FloatArray],
 ) -> None:
-    """Paint the geoms, the farthest first."""
+    """Paint the geoms, from back to front."""
     model = character.model
     pieces = []
     for geom in range(model.ngeom):

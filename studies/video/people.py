@@ -1,4 +1,4 @@
-"""People of other shapes than the character's, and whose motions they do."""
+"""People with other shapes than the character's, and the recordings that they perform."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.motion import Motion
 from dynresp.support.paths import models_folder
 
-# Videos are cut into pieces of at most so long, and a piece lasts at least so long [s].
+# Longest and shortest pieces into which videos are cut [s].
 _PIECE_S, _LEAST_S = 20.0, 1.5
 
 
@@ -55,8 +55,8 @@ class Body:
                     geom.fromto = np.asarray(geom.fromto) * length
                     geom.size = [geom.size[0] * girth, 0.0, 0.0]
         folder.mkdir(parents=True, exist_ok=True)
-        told = "-".join(f"{x:g}" for x in dataclasses.astuple(self))
-        file = folder / f"person-{told}.xml"
+        shape = "-".join(f"{x:g}" for x in dataclasses.astuple(self))
+        file = folder / f"person-{shape}.xml"
         spec.compile()
         file.write_text(spec.to_xml())
         return Character(file)
@@ -73,7 +73,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody of whom there is motion capture.
+    """A performer with motion capture.
 
     Attributes:
         name: For people.

@@ -1,8 +1,8 @@
 """How well, how soon and how fast an avatar follows strangers in videos.
 
-Nobody is compared with himself: the database, its clusters, what its frames look like and what is
-learnt of them are made of others' motion, not even captured in the same studio, and the person is
-filmed in another body's shape than the character's, in a patterned room under moving light.
+The database, its clusters, silhouettes and recognition are made of other people's motion, from
+other studios. The person is filmed with another body shape than the character's, in a patterned
+room under moving light.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from studies.video.people import PEOPLE, Person
 FILMED_S, QUICK_S = 60.0, 3.0
 """How much is filmed of each person, and in a quick run [s]."""
 GRAPH = GraphConfig(contact_change=False, sigma=0.15)
-"""An avatar that is to follow at once needs more ways on than one that walks about."""
+"""An avatar that follows at once needs more jumps than one that walks about."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Fold:
     Attributes:
         person: Who is filmed.
         judged: The choices.
-        commonest: The cluster that is the most frequent in the database: the best constant answer
+        most_frequent: The most frequent cluster of the database: the best constant answer
             that can be known before.
         see_s: Seconds of computing a second of video until its rows are there.
         choose_s: The same from there to the choices.
@@ -56,7 +56,7 @@ class Fold:
 
     person: Person
     judged: Judged
-    commonest: int
+    most_frequent: int
     see_s: float
     choose_s: float
 
@@ -124,9 +124,9 @@ def judged_together(folds: Sequence[Fold]) -> dict[str, Value]:
     balanced = np.empty((len(folds), 3))
     for row, fold in zip(balanced, folds, strict=True):
         judged = fold.judged
-        given: tuple[IntArray | int, ...] = (judged.chosen, fold.commonest, judged.own)
+        given: tuple[IntArray | int, ...] = (judged.chosen, fold.most_frequent, judged.own)
         right.append(judged.right(judged.chosen))
-        constant.append(judged.right(fold.commonest))
+        constant.append(judged.right(fold.most_frequent))
         every = [judged.right(k) for k in range(judged.recent.shape[1])]
         best.append(max(every, key=lambda shares: float(shares.mean())))
         avatar.append(judged.right(judged.own))
@@ -174,7 +174,7 @@ def leave_out(
     database, table, translated = gathered.without(studio)
     graph = MotionGraph.from_database(database, GRAPH, character)
     clusters = find_visible_clusters(graph, most, character)
-    commonest = int(np.bincount(clusters.labels[graph.frames]).argmax())
+    most_frequent = int(np.bincount(clusters.labels[graph.frames]).argmax())
     forest = ClusterForest(graph, clusters)
     recogniser = Recogniser.trained(database, table, clusters.labels, seed)
     rng = np.random.default_rng(seed)
@@ -196,7 +196,7 @@ def leave_out(
         length = sum(take.seen[-1].time_s for take in own)
         seeing_s = sum(take.seconds for take in own)
         judged = Judged.joined(parts)
-        folds.append(Fold(person, judged, commonest, seeing_s / length, choosing_s / length))
+        folds.append(Fold(person, judged, most_frequent, seeing_s / length, choosing_s / length))
     return folds
 
 

@@ -71,7 +71,7 @@ def test_a_trained_classifier(tmp_path: Path) -> None:
     )
     path = tmp_path / "made.skops"
     save_classifier(path, classifier, subject.pipelines)
-    found = CliRunner().invoke(commands.app, ["select", "--classifier", str(path), "--json"])
+    found = CliRunner().invoke(commands.app, ["predict", "--classifier", str(path), "--json"])
     assert found.exit_code == 0, found.output
     content = json.loads(found.stdout)
     assert content["classes"] == 4

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.cli.generate import _duration, _pace, _paced, _told
+from dynresp.cli.generate import _duration, _rate_text, _text, _with_rate
 
 from ..datasets.samples import files, write_plan
 from .conftest import Command
@@ -53,7 +53,7 @@ def test_a_dataset_from_a_plan(plan: Path, tmp_path: Path, dynresp: Command) -> 
     assert files(out) == before
 
 
-def test_built_in_motions_that_stand_in_are_told(
+def test_built_in_motions_that_stand_in_are_text(
     tmp_path: Path, dynresp: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from dynresp.datasets import generation as making
@@ -77,7 +77,7 @@ def test_built_in_motions_that_stand_in_are_told(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--workers", "2", "--scheduler", "tcp://a:1"), "give one of them"),
+        (("--workers", "2", "--scheduler", "tcp://a:1"), "give only one of them"),
         (("--count", "0"), "--count"),
         (("--seed", "-1"), "--seed"),
         (("--shard-size", "0"), "--shard-size"),
@@ -99,7 +99,7 @@ def test_asking_wrongly_is_said(
 def test_one_is_no_plural() -> None:
     content = {"samples": 1, "shards": 1, "hits": 0, "misses": 1, "diverged": 0, "shards_made": 1,
                "shards_remade": 0, "samples_per_s": None, "folder": "out"}  # fmt: skip
-    assert _told(content).splitlines()[:3] == [
+    assert _text(content).splitlines()[:3] == [
         "1 sample in 1 shard",
         "  outcomes   0 hits, 1 miss, 0 diverged",
         "  made       1 shard",
@@ -116,10 +116,10 @@ def test_a_wrong_plan_says_which_key(plan: Path, tmp_path: Path, dynresp: Comman
 
 def test_rate_and_time_left() -> None:
     seen = deque([(10.0, 100), (20.0, 900)])
-    assert _pace("labelling", 900, 8900, seen, counted=False) == (
+    assert _rate_text("labelling", 900, 8900, seen, counted=False) == (
         "labelling, 80 samples/s, 1 min 40 s left"
     )
-    assert _pace("labelling", 100, 200, deque([(1.0, 5)]), counted=True) == (
+    assert _rate_text("labelling", 100, 200, deque([(1.0, 5)]), counted=True) == (
         "labelling, 100 of 200"
     )
     assert _duration(7.2) == "7 s"
@@ -132,7 +132,7 @@ def test_lines_are_few(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
     monkeypatch.setattr(generate.time, "monotonic", lambda: now)
     told: list[str] = []
-    tell = _paced(lambda stage, done, of: told.append(stage))
+    tell = _with_rate(lambda stage, done, of: told.append(stage))
     tell("starting workers", 0, 9000)
     for second in range(90):
         now = float(second)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dynresp.datasets.dataset_spec import DatasetPlan
-from dynresp.datasets.dataset_spec_reader import parse_plan
+from dynresp.datasets.dataset_spec import DatasetSpec
+from dynresp.datasets.dataset_spec_reader import parse_dataset_spec
 from dynresp.datasets.shard_schema import Column, Columns, columns
 
 PLAN = """\
@@ -48,11 +48,11 @@ LAYOUT: tuple[Column, ...] = columns(5, 3)
 """Of made-up shards: five features, three classes."""
 
 
-def plan(**table: Any) -> DatasetPlan:
-    """The plan above, its `[plan]` changed."""
+def plan(**table: Any) -> DatasetSpec:
+    """The spec above, its `[plan]` changed."""
     content = tomllib.loads(PLAN)
     content["plan"].update(table)
-    return parse_plan(content)
+    return parse_dataset_spec(content)
 
 
 def write_plan(folder: Path) -> Path:

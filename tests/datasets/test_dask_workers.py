@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 
 from dynresp.datasets import dask_workers as cluster
-from dynresp.datasets.sample_worker import Job, Workshop
-from dynresp.datasets.shards import places
+from dynresp.datasets.sample_worker import Job, SampleWorker
+from dynresp.datasets.shards import shard_ranges
 from dynresp.support.errors import DynrespError, MissingExtraError, UsageError
 
 from .samples import command, files, plan, ran, write_plan
@@ -133,16 +133,16 @@ def test_a_scheduler_that_dies(tmp_path: Path, words: list[object]) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_with_other_things_is_refused(tmp_path: Path, workshop: Workshop) -> None:
-    manifest = {**workshop.manifest(8), "features": ["another"]}
+def test_a_worker_with_other_things_is_refused(tmp_path: Path, sample_worker: SampleWorker) -> None:
+    manifest = {**sample_worker.manifest(8), "features": ["another"]}
     job = Job(plan(), tmp_path, tmp_path / "not there", manifest)
     with scheduler(tmp_path) as (address, _), ExitStack() as stack:
         # A cluster may get its workers later.
         late = worker(address, tmp_path, DYNRESP_MOTIONS=str(tmp_path))
-        making = cluster.make_there(
-            job, places("x", 20, 8), address, lambda: stack.enter_context(late)
+        making = cluster.make_on_cluster(
+            job, shard_ranges("x", 20, 8), address, lambda: stack.enter_context(late)
         )
-        with pytest.raises(DynrespError, match=r"worker tcp://.*different there: features"):
+        with pytest.raises(DynrespError, match=r"worker tcp://.*this machine: features"):
             next(making)
 
 
@@ -180,7 +180,7 @@ def test_with_tls(tmp_path: Path, words: list[object], dataset: Path) -> None:
 def refused(address: str) -> str:
     job = Job(plan(), Path(), None, {})
     with pytest.raises(UsageError) as caught:
-        next(cluster.make_there(job, places("x", 1, 1), address, lambda: None))
+        next(cluster.make_on_cluster(job, shard_ranges("x", 1, 1), address, lambda: None))
     return str(caught.value)
 
 
@@ -195,14 +195,18 @@ def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     job = Job(plan(), Path(), None, {})
     with pytest.raises(MissingExtraError, match=r"pip install 'dynresp\[cluster\]'"):
-        next(cluster.make_there(job, places("x", 1, 1), "tcp://127.0.0.1:1", lambda: None))
+        next(
+            cluster.make_on_cluster(job, shard_ranges("x", 1, 1), "tcp://127.0.0.1:1", lambda: None)
+        )
 
 
 def test_nobody_listens(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
     job = Job(plan(), Path(), None, {})
     with pytest.raises(DynrespError, match="no Dask scheduler can be reached"):
-        next(cluster.make_there(job, places("x", 1, 1), "tcp://127.0.0.1:1", lambda: None))
+        next(
+            cluster.make_on_cluster(job, shard_ranges("x", 1, 1), "tcp://127.0.0.1:1", lambda: None)
+        )
 
 
 @pytest.mark.slow
@@ -210,7 +214,7 @@ def test_what_accepts_and_never_answers(words: list[object]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as mute:
         done = ran(*words, "--scheduler", f"tcp://127.0.0.1:{mute.getsockname()[1]}")
     assert done.returncode == 1
-    assert "has not answered as a Dask scheduler does within 20 s" in done.stderr
+    assert "no Dask scheduler has answered at" in done.stderr
     assert "Traceback" not in done.stderr
 
 

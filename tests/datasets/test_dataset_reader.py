@@ -6,7 +6,7 @@ import pytest
 
 from dynresp.datasets.dataset_reader import load_dataset
 from dynresp.datasets.sample_draws import draw_sample
-from dynresp.datasets.shards import encode, places, read_shard
+from dynresp.datasets.shards import encode, read_shard, shard_ranges
 from dynresp.support.errors import DynrespError, UsageError
 
 from .samples import plan
@@ -99,13 +99,13 @@ def test_damage_is_named(copied: Path, what: str) -> None:
 def test_indices_that_lead_nowhere_are_refused(copied: Path) -> None:
     """Also where the shard's hash fits."""
     facts = load_dataset(copied).facts
-    place = places(facts.identity, facts.count, facts.shard_size)[1]
+    place = shard_ranges(facts.identity, facts.count, facts.shard_size)[1]
     for column, number in (("label", 25), ("outcome", -1), ("target", 14), ("base", 2)):
         contents = read_shard(copied, facts.layout, place)
         contents[column] = contents[column].copy()
         contents[column][3] = number
         (copied / place.name).write_bytes(encode(contents, facts.layout, place))
-        with pytest.raises(DynrespError, match=rf"00001\.parquet: damaged \({column} has a number"):
+        with pytest.raises(DynrespError, match=rf"00001\.parquet: damaged \({column} has an index"):
             load_dataset(copied)
         contents[column][3] = 0
         (copied / place.name).write_bytes(encode(contents, facts.layout, place))

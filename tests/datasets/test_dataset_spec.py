@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.datasets.dataset_spec import DatasetPlan, plain
-from dynresp.datasets.dataset_spec_reader import parse_plan, read_plan
+from dynresp.datasets.dataset_spec import DatasetSpec, plain
+from dynresp.datasets.dataset_spec_reader import parse_dataset_spec, read_dataset_spec
 from dynresp.specs.toml_reader import MAX_FILE_BYTES
 from dynresp.specs.values import Choice, Uniform
 from dynresp.support.errors import SpecError
@@ -37,7 +37,7 @@ def test_there_are_examples() -> None:
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda f: f.stem)
 def test_the_examples_are_right(file: Path) -> None:
-    found = read_plan(file)
+    found = read_dataset_spec(file)
     for base in found.base:
         assert base.motion.startswith("builtin:") or base.otherwise is not None
 
@@ -50,9 +50,9 @@ def test_count_and_seed_of_the_command_line_count() -> None:
 
 @pytest.mark.parametrize("text", [PLAN, *(f.read_text(encoding="utf-8") for f in EXAMPLES)])
 def test_a_plan_in_plain_words_is_the_same_plan(text: str) -> None:
-    found = parse_plan(tomllib.loads(text))
+    found = parse_dataset_spec(tomllib.loads(text))
     again = json.loads(json.dumps(plain(found)))
-    assert DatasetPlan.model_validate(again) == found
+    assert DatasetSpec.model_validate(again) == found
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,11 @@ def test_a_plan_in_plain_words_is_the_same_plan(text: str) -> None:
         ('kind = "ball"', 'kind = "bal"', "impact 1.kind: expected one of ball, punch, push, got"),
         ('kind = "ball"', 'kind = "strike"', "expected one of ball, punch, push, got 'strike'"),
         ('kind = "ball"\n', "", "impact 1.kind is missing; expected one of ball"),
-        ('kind = "ball"', 'kind = "ball"\ntime_s = 2', "impact 1: a plan has no time_s, got 2"),
+        (
+            'kind = "ball"',
+            'kind = "ball"\ntime_s = 2',
+            "impact 1: a dataset spec has no time_s, got 2",
+        ),
         ("mass_kg", "mas_kg", "impact 1.mas_kg is not a key of [[impact]] of kind 'ball'"),
         ("mass_kg", "mas_kg", "did you mean 'mass_kg'"),
         ("mass_kg", "hit", "impact 1.hit is not a key of [[impact]] of kind 'ball'"),
@@ -72,11 +76,11 @@ def test_a_plan_in_plain_words_is_the_same_plan(text: str) -> None:
         ('"pelvis"', '"pelivs"', "impact 2.target: unknown body 'pelivs'. Did you mean 'pelvis'?"),
         ("[[impact]]\nkind", "[impact]\nkind", "not valid TOML"),
         ("count = 20", "count = 0", "plan.count: expected a whole number from 1 to 10000000"),
-        ("count = 20", "", "plan.count is missing; say how many samples"),
-        ('name = "A test"', "", "plan.name is missing; say in a few words"),
+        ("count = 20", "", "plan.count is missing; give the number of samples"),
+        ('name = "A test"', "", "plan.name is missing; describe the samples"),
         ('[plan]\nname = "A test"\nseed = 5\ncount = 20', "", "plan is missing; add [plan]"),
         ("seed = 5", "sed = 5", "plan.sed is not a key of [plan] (did you mean 'seed'?)"),
-        ('"builtin:idle"', '"builtin:walk"', "two [[base]] tables are called 'builtin:walk'"),
+        ('"builtin:idle"', '"builtin:walk"', "two [[base]] tables have the name 'builtin:walk'"),
         ('"builtin:idle"', "3", "base 2.motion: expected text in quotes, got 3"),
         ("weight = 2", "mirrored = 1", "base 1.mirrored: expected true or false, got 1"),
         ("weight = 2", "stat_s = 1", "base 1.stat_s is not a key of [base]"),
@@ -90,7 +94,7 @@ def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) ->
     file = tmp_path / "file.toml"
     file.write_text(PLAN.replace(old, new), encoding="utf-8")
     with pytest.raises(SpecError) as caught:
-        read_plan(file)
+        read_dataset_spec(file)
     message = str(caught.value)
     assert message.startswith(str(file))
     assert said in message
@@ -100,30 +104,30 @@ def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) ->
 def test_one_table_needs_no_number() -> None:
     content = tomllib.loads(PLAN)
     content["impact"] = [{"kind": "ball", "mass_kg": -1}]
-    with pytest.raises(SpecError, match=r"plan: impact\.mass_kg: expected"):
-        parse_plan(content)
+    with pytest.raises(SpecError, match=r"dataset spec: impact\.mass_kg: expected"):
+        parse_dataset_spec(content)
 
 
 @pytest.mark.parametrize("key", ["base", "impact"])
 def test_lists_of_tables(key: str) -> None:
     content = tomllib.loads(PLAN)
     with pytest.raises(SpecError, match=rf"write \[\[{key}\]\]"):
-        parse_plan({**content, key: content[key][0]})
+        parse_dataset_spec({**content, key: content[key][0]})
     with pytest.raises(SpecError, match=rf"{key}: expected at least 1 table \[\[{key}\]\], got 0"):
-        parse_plan({**content, key: []})
+        parse_dataset_spec({**content, key: []})
     many = [content[key][0]] * 101
     with pytest.raises(SpecError, match=rf"at most 100 tables \[\[{key}\]\], got 101"):
-        parse_plan({**content, key: many})
+        parse_dataset_spec({**content, key: many})
     with pytest.raises(SpecError, match=f"{key}: expected"):
-        parse_plan({**content, key: 3})
+        parse_dataset_spec({**content, key: 3})
     with pytest.raises(SpecError, match=f"{key} 2: expected a table"):
-        parse_plan({**content, key: [content[key][0], 3]})
+        parse_dataset_spec({**content, key: [content[key][0], 3]})
 
 
 def test_many_mistakes_are_counted() -> None:
     content = tomllib.loads(PLAN)
     with pytest.raises(SpecError, match="and 12 more"):
-        parse_plan({**content, **{f"key{i}": 1 for i in range(20)}})
+        parse_dataset_spec({**content, **{f"key{i}": 1 for i in range(20)}})
 
 
 @pytest.mark.parametrize(
@@ -136,13 +140,13 @@ def test_many_mistakes_are_counted() -> None:
         (b"", "plan is missing"),
     ],
 )
-def test_a_file_that_is_no_plan(tmp_path: Path, content: bytes, said: str) -> None:
+def test_a_file_that_is_no_dataset_spec(tmp_path: Path, content: bytes, said: str) -> None:
     file = tmp_path / "p.toml"
     file.write_bytes(content)
     with pytest.raises(SpecError, match=said):
-        read_plan(file)
+        read_dataset_spec(file)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="no such file; expected a plan file"):
-        read_plan(tmp_path / "p.toml")
+    with pytest.raises(SpecError, match="no such file; expected a dataset spec"):
+        read_dataset_spec(tmp_path / "p.toml")

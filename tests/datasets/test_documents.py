@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.datasets.dataset_spec import KINDS, DatasetPlan
-from dynresp.datasets.dataset_spec_reader import parse_plan
+from dynresp.datasets.dataset_spec import KINDS, DatasetSpec
+from dynresp.datasets.dataset_spec_reader import parse_dataset_spec
 from dynresp.datasets.generation import Summary
 from dynresp.datasets.shard_schema import columns
 from dynresp.support.paths import example_specs
@@ -17,7 +17,7 @@ TEXT = (Path(__file__).parents[2] / "docs/datasets.md").read_text(encoding="utf-
 
 def test_its_plan_is_right() -> None:
     (text,) = re.findall(r"^```toml\n(.*?)^```", TEXT, re.M | re.S)
-    assert parse_plan(tomllib.loads(text)).plan.count == 5000
+    assert parse_dataset_spec(tomllib.loads(text)).plan.count == 5000
 
 
 def test_all_columns_are_explained_in_order() -> None:
@@ -32,7 +32,7 @@ def test_all_columns_are_explained_in_order() -> None:
 
 @pytest.mark.parametrize("table", ["plan", "base", "impact", "library", "settings"])
 def test_all_tables_of_a_plan_are_explained(table: str) -> None:
-    assert set(DatasetPlan.model_fields) == {"plan", "base", "impact", "library", "settings"}
+    assert set(DatasetSpec.model_fields) == {"plan", "base", "impact", "library", "settings"}
     assert re.search(rf"^\| `\[+{table}\]+` \|", TEXT, re.M)
 
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from dynresp.datasets.dataset_spec_reader import read_plan
+from dynresp.datasets.dataset_spec_reader import read_dataset_spec
 from dynresp.datasets.manifest_reader import parse_facts
-from dynresp.datasets.sample_worker import Workshop
-from dynresp.datasets.shards import decode, places
+from dynresp.datasets.sample_worker import SampleWorker
+from dynresp.datasets.shards import decode, shard_ranges
 from dynresp.support.paths import example_specs
 
 PLANS = example_specs("datasets")
@@ -16,11 +16,11 @@ CORE = sorted(file.stem for file in PLANS.glob("*.toml") if not file.stem.starts
 
 def hits(name: str, motions: Path) -> tuple[int, bool]:
     """How many of eight samples are hits, and whether the library is built in."""
-    workshop = Workshop(read_plan(PLANS / f"{name}.toml"), PLANS, motions)
-    manifest = workshop.manifest(8)
+    sample_worker = SampleWorker(read_dataset_spec(PLANS / f"{name}.toml"), PLANS, motions)
+    manifest = sample_worker.manifest(8)
     facts = parse_facts(manifest)
-    place = places(facts.identity, 8, 8)[0]
-    found = decode(workshop.make(place), facts.layout, place, name)
+    place = shard_ranges(facts.identity, 8, 8)[0]
+    found = decode(sample_worker.make(place), facts.layout, place, name)
     facts.check(found, name)
     hit = found["outcome"] == facts.outcomes.index("hit")
     return int(hit.sum()), manifest["library"]["built_in"]

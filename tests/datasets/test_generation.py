@@ -10,12 +10,12 @@ import pytest
 
 from dynresp.datasets import generation as making
 from dynresp.datasets.dataset_reader import load_dataset
-from dynresp.datasets.dataset_spec import DatasetPlan
+from dynresp.datasets.dataset_spec import DatasetSpec
 from dynresp.datasets.generation import Summary, generate
 from dynresp.datasets.manifest import MANIFEST
-from dynresp.datasets.sample_worker import Job, Workshop, load
+from dynresp.datasets.sample_worker import Job, SampleWorker, load_worker
 from dynresp.datasets.shard_schema import columns
-from dynresp.datasets.shards import Place, decode
+from dynresp.datasets.shards import ShardRange, decode
 from dynresp.support.errors import DynrespError, UsageError
 
 from .samples import files, plan
@@ -28,7 +28,7 @@ def copied(dataset: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(dataset, tmp_path / "copy"))
 
 
-def run(out: Path, what: DatasetPlan | None = None, **more: Any) -> Summary:
+def run(out: Path, what: DatasetSpec | None = None, **more: Any) -> Summary:
     # Motions come from an empty folder, which any folder without motions is.
     return generate(what or plan(), out.parent, out, motions=out.parent, **more)
 
@@ -45,12 +45,14 @@ def test_a_dataset_is_made(dataset: Path, tmp_path: Path) -> None:
     assert told[-1] == ("labelling", 20, 20)
 
 
-def test_a_sample_alone_is_the_same_as_among_others(dataset: Path, workshop: Workshop) -> None:
+def test_a_sample_alone_is_the_same_as_among_others(
+    dataset: Path, sample_worker: SampleWorker
+) -> None:
     data = load_dataset(dataset)
     layout = columns(len(data.facts.feature_names), len(data.facts.classes))
     for index in (0, 7, 13):
-        place = Place("alone", 0, index, 1)
-        alone = decode(workshop.make(place), layout, place, "alone")
+        place = ShardRange("alone", 0, index, 1)
+        alone = decode(sample_worker.make(place), layout, place, "alone")
         for name in ("features", "errors", "label", "exit_frames", "entry_frames", "outcome"):
             assert alone[name].tobytes() == getattr(data, name)[[index]].tobytes(), name
         assert alone["contact_point"].tobytes() == data.contact_point[[index]].tobytes()
@@ -67,9 +69,9 @@ def test_the_size_of_shards_changes_no_sample(dataset: Path, tmp_path: Path) -> 
 def test_the_order_of_shards_changes_nothing(
     dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    in_order = making.make_here
+    in_order = making.make_locally
     monkeypatch.setattr(
-        making, "make_here", lambda job, wanted, *rest: in_order(job, wanted[::-1], *rest)
+        making, "make_locally", lambda job, wanted, *rest: in_order(job, wanted[::-1], *rest)
     )
     run(tmp_path / "out", shard_size=8)
     assert files(tmp_path / "out") == files(dataset)
@@ -141,14 +143,14 @@ def test_a_larger_count_extends(
 
 
 def test_a_smaller_count_is_refused(copied: Path, dataset: Path) -> None:
-    with pytest.raises(UsageError, match="holds a dataset of 20 samples, and 13 were asked for"):
+    with pytest.raises(UsageError, match="holds a dataset of 20 samples, more than the 13 to make"):
         run(copied, plan(count=13))
     (copied / MANIFEST).unlink()
-    with pytest.raises(UsageError, match="of at least 20 samples, and 13 were asked for"):
+    with pytest.raises(UsageError, match="of at least 20 samples, more than the 13 to make"):
         run(copied, plan(count=13), shard_size=8)
     assert (copied / "shard-00002.parquet").exists()
     (copied / "shard-00002.parquet").write_bytes(b"")
-    with pytest.raises(UsageError, match="holds more than the 16 samples"):
+    with pytest.raises(UsageError, match="holds more than 16 samples"):
         run(copied, plan(count=16), shard_size=8)
 
 
@@ -235,9 +237,9 @@ def test_a_wrong_address_is_refused_before_anything(tmp_path: Path) -> None:
     ids=["seed", "size", "impacts"],
 )
 def test_another_dataset_is_refused(
-    copied: Path, dataset: Path, what: DatasetPlan, size: int | None, said: str
+    copied: Path, dataset: Path, what: DatasetSpec, size: int | None, said: str
 ) -> None:
-    with pytest.raises(UsageError, match=f"holds another dataset; different are {said}"):
+    with pytest.raises(UsageError, match=f"holds another dataset, with another {said}"):
         run(copied, what, shard_size=size)
     assert files(copied) == files(dataset)
     # Nor without its manifest.
@@ -250,7 +252,7 @@ def test_another_version_is_refused(copied: Path, monkeypatch: pytest.MonkeyPatc
     from dynresp.datasets import manifest
 
     monkeypatch.setattr(manifest, "versions", lambda: {"dynresp": "9", "mujoco": "9"})
-    with pytest.raises(UsageError, match=r"different are versions\.dynresp, versions\.mujoco"):
+    with pytest.raises(UsageError, match=r"with another versions\.dynresp, versions\.mujoco"):
         run(copied)
 
 
@@ -289,27 +291,29 @@ def test_two_at_a_time_are_refused(copied: Path) -> None:
 
 def test_folders_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(UsageError, match="is a file; expected a folder for the dataset"):
+    with pytest.raises(UsageError, match="is a file; give a folder for the dataset"):
         run(tmp_path / "file")
     with pytest.raises(UsageError, match="cannot be made"):
         run(tmp_path / "file" / "sub")
 
 
-def test_a_worker_that_has_something_else_refuses(workshop: Workshop, tmp_path: Path) -> None:
-    job = Job(plan(), tmp_path, tmp_path, workshop.manifest(8))
-    assert load(job).manifest(8) == job.manifest
+def test_a_worker_that_has_something_else_refuses(
+    sample_worker: SampleWorker, tmp_path: Path
+) -> None:
+    job = Job(plan(), tmp_path, tmp_path, sample_worker.manifest(8))
+    assert load_worker(job).manifest(8) == job.manifest
     other = {**job.manifest, "versions": {**job.manifest["versions"], "mujoco": "3.99"}}
-    with pytest.raises(DynrespError, match=r"different there: versions\.mujoco\. Install the same"):
-        load(replace(job, manifest=other))
+    with pytest.raises(DynrespError, match=r"this machine: versions\.mujoco\. Install the same"):
+        load_worker(replace(job, manifest=other))
 
 
 def test_a_shard_that_came_damaged_is_not_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    good = making.make_here
+    good = making.make_locally
     monkeypatch.setattr(
         making,
-        "make_here",
+        "make_locally",
         lambda *given: ((place, data[:-9]) for place, data in good(*given)),
     )
     with pytest.raises(DynrespError, match="shard 0, as it was made: damaged"):
@@ -318,18 +322,18 @@ def test_a_shard_that_came_damaged_is_not_written(
 
 
 def test_diverged_samples_are_kept_and_marked(
-    workshop: Workshop, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    sample_worker: SampleWorker, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     from dynresp.response.search.hit_labels import Labelled
 
-    label = workshop._labeller.label
+    label = sample_worker._labeller.label
 
     def diverging(hits: Any) -> Labelled:
         found = label(hits)
         found.outcome[0] = 2
         return found
 
-    monkeypatch.setattr(workshop._labeller, "label", diverging)
+    monkeypatch.setattr(sample_worker._labeller, "label", diverging)
     summary = run(tmp_path / "out", shard_size=10)
     assert summary.outcomes["diverged"] == 2
     data = load_dataset(tmp_path / "out")

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from dynresp.datasets import local_workers as processes
-from dynresp.datasets.local_workers import make_here
-from dynresp.datasets.sample_worker import Job, Workshop
-from dynresp.datasets.shards import Place, places
+from dynresp.datasets.local_workers import make_locally
+from dynresp.datasets.sample_worker import Job, SampleWorker
+from dynresp.datasets.shards import ShardRange, shard_ranges
 from dynresp.support.errors import DynrespError
 
 from .samples import files, plan
@@ -24,7 +24,7 @@ def quick(job: Any, pipe: Connection) -> None:
     marks: Path = job
     while True:
         try:
-            place: Place = pipe.recv()
+            place: ShardRange = pipe.recv()
         except EOFError:
             return
         mark = marks / f"{place.number}"
@@ -54,9 +54,9 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def collected(folder: Path, identity: str, told: list[int] | None = None) -> list[int]:
-    wanted = places(identity, 20, 4)
+    wanted = shard_ranges(identity, 20, 4)
     said = [] if told is None else told
-    found = list(make_here(folder, wanted, 2, said.append))  # type: ignore[arg-type]
+    found = list(make_locally(folder, wanted, 2, said.append))  # type: ignore[arg-type]
     assert all(data == str(place.number).encode() for place, data in found)
     return [place.number for place, _ in found]
 
@@ -109,7 +109,7 @@ def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     before = dict(os.environ)
-    making = make_here(tmp_path, places("x", 20, 4), 2, lambda done: None)  # type: ignore[arg-type]
+    making = make_locally(tmp_path, shard_ranges("x", 20, 4), 2, lambda done: None)  # type: ignore[arg-type]
     next(making)
     assert len(multiprocessing.active_children()) == 2
     making.close()
@@ -119,19 +119,21 @@ def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.slow
-def test_two_workers_make_the_same_bytes(workshop: Workshop, dataset: Path, tmp_path: Path) -> None:
-    manifest = workshop.manifest(8)
+def test_two_workers_make_the_same_bytes(
+    sample_worker: SampleWorker, dataset: Path, tmp_path: Path
+) -> None:
+    manifest = sample_worker.manifest(8)
     job = Job(plan(), tmp_path, tmp_path, manifest)
     told: list[int] = []
-    made = make_here(job, places(manifest["identity"], 20, 8), 2, told.append)
+    made = make_locally(job, shard_ranges(manifest["identity"], 20, 8), 2, told.append)
     found = {place.name: data for place, data in made}
     assert found == {k: v for k, v in files(dataset).items() if k.startswith("shard")}
     assert max(told) >= 8
 
 
 @pytest.mark.slow
-def test_a_worker_that_lacks_something_says_so(workshop: Workshop, tmp_path: Path) -> None:
-    manifest = {**workshop.manifest(8), "features": ["another"]}
+def test_a_worker_that_lacks_something_says_so(sample_worker: SampleWorker, tmp_path: Path) -> None:
+    manifest = {**sample_worker.manifest(8), "features": ["another"]}
     job = Job(plan(), tmp_path, tmp_path, manifest)
-    with pytest.raises(DynrespError, match="different there: features"):
-        list(make_here(job, places("x", 20, 8), 1, lambda done: None))
+    with pytest.raises(DynrespError, match="this machine: features"):
+        list(make_locally(job, shard_ranges("x", 20, 8), 1, lambda done: None))

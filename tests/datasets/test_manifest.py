@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dynresp.datasets.manifest import MANIFEST, differences, identity_of, write_manifest
 from dynresp.datasets.manifest_reader import ManifestError, parse_facts, read_manifest
-from dynresp.datasets.sample_worker import Workshop
+from dynresp.datasets.sample_worker import SampleWorker
 from dynresp.response.search.hit_labels import OUTCOMES
 from dynresp.support.errors import UsageError
 
@@ -18,8 +18,8 @@ from .samples import plan
 
 
 @pytest.fixture(scope="module")
-def manifest(workshop: Workshop) -> dict[str, Any]:
-    return workshop.manifest(8)
+def manifest(sample_worker: SampleWorker) -> dict[str, Any]:
+    return sample_worker.manifest(8)
 
 
 def test_it_says_what_the_numbers_mean(manifest: dict[str, Any]) -> None:
@@ -46,7 +46,9 @@ def test_it_is_written_and_read(manifest: dict[str, Any], tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.iterdir()] == [MANIFEST]
 
 
-def test_count_and_name_do_not_decide(manifest: dict[str, Any], workshop: Workshop) -> None:
+def test_count_and_name_do_not_decide(
+    manifest: dict[str, Any], sample_worker: SampleWorker
+) -> None:
     other = copy.deepcopy(manifest)
     other["count"] = other["plan"]["plan"]["count"] = 99
     other["plan"]["plan"]["name"] = "another"
@@ -142,4 +144,4 @@ def test_whatever_a_manifest_says_it_is_parsed_or_refused(
 
 
 def test_a_world_is_the_same_each_time(manifest: dict[str, Any], tmp_path: Path) -> None:
-    assert Workshop(plan(), tmp_path, tmp_path).manifest(8) == manifest
+    assert SampleWorker(plan(), tmp_path, tmp_path).manifest(8) == manifest

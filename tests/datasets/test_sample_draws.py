@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynresp.datasets.dataset_spec import DatasetPlan
-from dynresp.datasets.dataset_spec_reader import parse_plan
-from dynresp.datasets.sample_draws import GOES_ON_S, check_durations, draw_sample
+from dynresp.datasets.dataset_spec import DatasetSpec
+from dynresp.datasets.dataset_spec_reader import parse_dataset_spec
+from dynresp.datasets.sample_draws import TAIL_S, check_durations, draw_sample
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Push, prepare
@@ -17,8 +17,8 @@ from .samples import plan
 DURATIONS = (12.0, 5.0)
 
 
-def planned(*impacts: dict[str, object], bases: int = 1) -> DatasetPlan:
-    return parse_plan(
+def planned(*impacts: dict[str, object], bases: int = 1) -> DatasetSpec:
+    return parse_dataset_spec(
         {
             "plan": {"name": "x", "count": 1},
             "base": [{"motion": f"builtin:{i}"} for i in range(bases)],
@@ -78,11 +78,11 @@ def test_every_sample_can_be_simulated(
     for index in range(20):
         sample = draw_sample(found, [base.duration], index)
         prepared = prepare(sample.impact, base, character, PhysicsConfig())
-        assert sample.impact.time <= base.duration - GOES_ON_S + 1e-9
+        assert sample.impact.time <= base.duration - TAIL_S + 1e-9
         if phase == 0:
             assert prepared.start == 0
         if phase == 1:
-            assert sample.impact.time == pytest.approx(base.duration - GOES_ON_S)
+            assert sample.impact.time == pytest.approx(base.duration - TAIL_S)
 
 
 def test_a_base_motion_that_is_too_short_is_refused() -> None:

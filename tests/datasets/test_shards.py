@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 
 from dynresp.datasets.shard_schema import columns
 from dynresp.datasets.shards import (
-    ForeignShardError,
-    Place,
+    OtherDatasetError,
     ShardError,
+    ShardRange,
     decode,
     encode,
-    left_over,
-    places,
+    leftover_files,
     read_shard,
     shard_files,
+    shard_ranges,
 )
 
 from .samples import LAYOUT, made_up
 
-PLACE = Place("abc", 2, 14, 7)
+PLACE = ShardRange("abc", 2, 14, 7)
 DATA = encode(made_up(7, 14), LAYOUT, PLACE)
 
 
@@ -55,7 +55,7 @@ def test_others_can_read_the_file() -> None:
 
 @pytest.mark.parametrize(("count", "size"), [(1, 500), (500, 500), (501, 500), (20, 8)])
 def test_places_cover_all_samples_once(count: int, size: int) -> None:
-    found = places("abc", count, size)
+    found = shard_ranges("abc", count, size)
     assert [i for p in found for i in range(p.first, p.first + p.rows)] == list(range(count))
     assert [p.number for p in found] == list(range(len(found)))
     assert all(p.rows == size for p in found[:-1])
@@ -69,13 +69,13 @@ def test_places_cover_all_samples_once(count: int, size: int) -> None:
         (replace(PLACE, rows=8), "expected rows 8, it has 7"),
     ],
 )
-def test_another_shard_gives_itself_away(place: Place, said: str) -> None:
+def test_another_shard_gives_itself_away(place: ShardRange, said: str) -> None:
     with pytest.raises(ShardError, match=f"file: {said}"):
         decode(DATA, LAYOUT, place, "file")
 
 
 def test_a_shard_of_another_dataset_is_told_from_a_damaged_one() -> None:
-    with pytest.raises(ForeignShardError, match="file: a shard of another dataset"):
+    with pytest.raises(OtherDatasetError, match="file: a shard of another dataset"):
         decode(DATA, LAYOUT, replace(PLACE, identity="xyz"), "file")
 
 
@@ -109,7 +109,7 @@ def _check_damaged(data: bytes) -> None:
 def test_a_plain_table_is_no_shard() -> None:
     sink = pa.BufferOutputStream()
     pq.write_table(pa.table({"index": [1, 2]}), sink)
-    with pytest.raises(ShardError, match="it does not say what it is"):
+    with pytest.raises(ShardError, match="no metadata of dynresp"):
         decode(sink.getvalue().to_pybytes(), LAYOUT, PLACE, "file")
 
 
@@ -132,7 +132,7 @@ def test_files_of_a_folder(tmp_path: Path) -> None:
     for name in (*names, *temporary, ".shard-00002-mine.parquet"):
         (tmp_path / name).touch()
     assert set(shard_files(tmp_path)) == {2, 123456}
-    assert {path.name for path in left_over(tmp_path)} == set(temporary)
+    assert {path.name for path in leftover_files(tmp_path)} == set(temporary)
     found = read_shard(tmp_path, LAYOUT, PLACE)
     assert np.array_equal(found["index"], np.arange(14, 21))
 

@@ -9,7 +9,7 @@ from dynresp.datasets.dataset_reader import Dataset
 from dynresp.datasets.manifest import FORMAT, identity_of, write_manifest
 from dynresp.datasets.manifest_reader import Facts
 from dynresp.datasets.shard_schema import PARAMETERS
-from dynresp.datasets.shards import encode, places
+from dynresp.datasets.shards import encode, shard_ranges
 from dynresp.response.prediction.hit_features import FEATURE_NAMES
 from dynresp.response.response import CARRY_ON
 
@@ -50,7 +50,7 @@ def facts(count: int, **changed: Any) -> Facts:
         "fps": 30.0,
         "settings": SETTINGS,
         "versions": {},
-        "plan": {"plan": {"name": "A test"}},
+        "spec": {"plan": {"name": "A test"}},
     }
     return Facts(**{**values, **changed})
 
@@ -104,7 +104,7 @@ def write_dataset(folder: Path, data: Dataset) -> Path:
         "schema_version": facts.schema_version,
         "count": facts.count,
         "shard_size": facts.shard_size,
-        "plan": {"plan": {"name": facts.plan["plan"]["name"], "seed": facts.seed}},
+        "plan": {"plan": {"name": facts.spec["plan"]["name"], "seed": facts.seed}},
         "bases": [{"name": name} for name in facts.bases],
         "library": {"name": facts.library, "identity": facts.library_identity},
         "character": {"identity": facts.character_identity, "bodies": list(facts.bodies)},
@@ -129,7 +129,7 @@ def write_dataset(folder: Path, data: Dataset) -> Path:
         else getattr(data, column.name)
         for column in facts.layout
     }
-    for place in places(content["identity"], facts.count, facts.shard_size):
+    for place in shard_ranges(content["identity"], facts.count, facts.shard_size):
         rows = slice(place.first, place.first + place.rows)
         own = {name: np.ascontiguousarray(array[rows]) for name, array in columns.items()}
         (folder / place.name).write_bytes(encode(own, facts.layout, place))

@@ -59,7 +59,7 @@ def test_it_beats_chance_and_latency_is_measured(trained: Trained, hits: Dataset
 
 
 def test_of_another_dataset_all_samples_count(trained: Trained) -> None:
-    other = dataset(150, seed=5, plan=OTHER_PLAN)
+    other = dataset(150, seed=5, spec=OTHER_PLAN)
     content = evaluate(trained.classifier, other, quiet)
     assert content["samples"] == np.count_nonzero(other.label >= 0)
     assert not content["held_out_only"]
@@ -85,7 +85,7 @@ def test_nothing_to_judge_by(hits: Dataset) -> None:
     all_of_it = train(hits, replace(QUICK, split=Split(0, 0.0)), quiet).classifier
     with pytest.raises(UsageError, match="--held-out"):
         evaluate(all_of_it, hits, quiet)
-    missed = replace(dataset(20, plan=OTHER_PLAN), label=np.full(20, -1, np.int16))
+    missed = replace(dataset(20, spec=OTHER_PLAN), label=np.full(20, -1, np.int16))
     with pytest.raises(UsageError, match="none of the 20"):
         evaluate(all_of_it, missed, quiet)
 

@@ -5,9 +5,16 @@ import numpy as np
 import pytest
 
 from dynresp.datasets.dataset_reader import Dataset
-from dynresp.learning.choice_metrics import Figures
+from dynresp.learning import training
+from dynresp.learning.choice_metrics import ChoiceMetrics
 from dynresp.learning.holdout import Split
-from dynresp.learning.svm_fitting import Parameters, Tried, by_merit, fit_pipeline, watched
+from dynresp.learning.svm_fitting import (
+    Parameters,
+    TriedParameters,
+    best_first,
+    fit_pipeline,
+    run_in_thread,
+)
 from dynresp.learning.training import TrainConfig, Trained, train
 from dynresp.response.prediction.hit_features import vector_columns
 from dynresp.response.response import CARRY_ON
@@ -75,9 +82,12 @@ def test_what_it_was_trained_on_is_told(trained: Trained, hits: Dataset) -> None
     assert trained.classifier.settings["window_s"] == 1 / 3
 
 
-def test_the_best_parameters_are_tried_again_on_more_samples(hits: Dataset) -> None:
-    config = replace(QUICK, searched_samples=60, finalists=1)
-    rounds = train(hits, config, quiet).classifier.facts["cross_validation"]["rounds"]
+def test_the_best_parameters_are_tried_again_on_more_samples(
+    hits: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(training, "SEARCHED_SAMPLES", 60)
+    monkeypatch.setattr(training, "FINALISTS", 1)
+    rounds = train(hits, QUICK, quiet).classifier.facts["cross_validation"]["rounds"]
     assert [len(tried) for tried in rounds] == [2, 1]
     assert [tried[0]["samples"] for tried in rounds] == [60, 240]
 
@@ -167,8 +177,7 @@ def test_other_features_are_refused() -> None:
         {"samples": 1},
         {"penalties": ()},
         {"gamma_factors": (0.0,)},
-        {"folds": 1},
-        {"finalists": 0},
+        {"reduced_components": 0},
     ],
 )
 def test_settings_that_make_no_sense(wrong: dict[str, Any]) -> None:
@@ -182,13 +191,13 @@ def test_an_unknown_grouping() -> None:
 
 
 def test_merit_is_regret_among_those_as_accurate_as_the_best() -> None:
-    def tried(accuracy: float, regret: float) -> Tried:
-        figures = Figures(400, accuracy, 1.0, 1.0, regret, 0.0)
-        return Tried(Parameters(1, accuracy, 1.0), figures)
+    def tried(accuracy: float, regret: float) -> TriedParameters:
+        figures = ChoiceMetrics(400, accuracy, 1.0, 1.0, regret, 0.0)
+        return TriedParameters(Parameters(1, accuracy, 1.0), figures)
 
     # The standard error is two per cent.
     items = [tried(0.70, 0.0), tried(0.80, 0.03), tried(0.79, 0.02), tried(0.77, 0.01)]
-    order = [item.figures.accuracy for item in by_merit(items)]
+    order = [item.metrics.accuracy for item in best_first(items)]
     assert order == [0.79, 0.80, 0.77, 0.70]
 
 
@@ -201,11 +210,11 @@ def test_long_work_is_told_of_and_its_errors_come_through() -> None:
     import time
 
     told = []
-    assert watched(lambda: time.sleep(1.2) or 7, lambda: told.append(1)) == 7
+    assert run_in_thread(lambda: time.sleep(1.2) or 7, lambda: told.append(1)) == 7
     assert told
 
     def fail() -> None:
         raise UsageError("no")
 
     with pytest.raises(UsageError, match="no"):
-        watched(fail, lambda: None)
+        run_in_thread(fail, lambda: None)
