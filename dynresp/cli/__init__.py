@@ -1,7 +1,7 @@
 """The command line. Results go to standard output, progress and messages to standard error.
 
-Exit codes: 0 done, 1 could not do it, 2 asked wrongly, 130 interrupted. Heavy imports stand inside
-the commands, so that help comes at once.
+Exit codes: 0 done, 1 could not be done, 2 wrong request, 130 interrupted. Heavy imports are inside
+the commands, so that help appears at once.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ def main() -> None:
 
 
 def _run() -> None:
-    # MuJoCo reads this on import, and fails where the renderer that it names is not there. Only
-    # the video is rendered, in a process of its own, which is told by another name.
+    # MuJoCo reads this variable on import, and fails if that renderer is missing. Only the video is
+    # rendered, in its own process, which reads the other variable.
     renderer = os.environ.pop("MUJOCO_GL", None)
     if renderer is not None:
         os.environ.setdefault("DYNRESP_GL", renderer)
     # Imported here, where an interruption is caught.
     from dynresp.cli.app import app
 
-    # A terminal that cannot show a character gets a question mark in its place.
+    # A terminal that cannot show a character shows a question mark instead.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    # A name in letters that the pictures' typeface lacks shows boxes there; that is no error.
+    # If a font lacks the letters of a name, pictures show boxes; that is not an error.
     warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font", UserWarning)
     app(prog_name="dynresp")

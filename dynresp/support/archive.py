@@ -49,7 +49,7 @@ class ArchiveFormat:
 
     Attributes:
         what: What it is, such as "motion"; its file is a "motion file".
-        error: Raised, after "PATH: ", for a file that is none or cannot be read.
+        error: Raised, with "PATH: " before its message, for a file that cannot be read.
         version: Number that its member `format_version` has; others are refused.
         members: Type and shape of each member, `format_version` among them. A type is NumPy's or
             `TEXT`; a name in a shape stands for a length that the file chooses.
@@ -77,7 +77,7 @@ class ArchiveFormat:
 
         Returns:
             Arrays by name, each of a type and shape that the format allows; text as Python strings.
-            That lengths of one name agree between members is the caller's to check.
+            The caller checks that lengths of one name agree between members.
 
         Raises:
             UsageError: As `error` says: it cannot be opened, is damaged or out of bounds, is of
@@ -95,8 +95,8 @@ class ArchiveFormat:
             raise
         # On damaged files zipfile and zlib raise a dozen kinds of errors, few of them documented.
         except Exception as error:
-            said = f"{type(error).__name__}: {error}"
-            self.fail(path, f"is damaged or no .npz file ({said})")
+            reason = f"{type(error).__name__}: {error}"
+            self.fail(path, f"is damaged or not an .npz file ({reason})")
 
     def write(self, path: str | Path, arrays: Arrays) -> None:
         """Write a file; the same arrays give the same bytes.

@@ -1,4 +1,4 @@
-"""Types of arrays, and closing them to writing."""
+"""Types of arrays, and making arrays read-only."""
 
 from __future__ import annotations
 
@@ -16,6 +16,6 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 def frozen(array: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
-    """The same array, closed to writing, since it is shared."""
+    """The same array, made read-only, since it is shared."""
     array.flags.writeable = False
     return array

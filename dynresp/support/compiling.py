@@ -1,9 +1,9 @@
-"""Compiling with numba, with or without a place to keep what was compiled.
+"""Compiling functions with numba, and keeping the compiled code if a folder can be written.
 
-Numba keeps compiled code until the file of the function changes. It does not notice that a function
+Numba keeps compiled code until the file of the function changes. It does not notice if a function
 of another file, which was compiled into it, has changed. So compiled code that is older than the
-newest of our kernels is thrown away here. For that to be enough, every compiled function lies in a
-file `*_kernel.py`, and such a file imports from no other files of ours than these and this one.
+newest kernel file is removed here. For that to be enough, every compiled function is in a file
+`*_kernel.py`, and such a file imports from dynresp only other kernel files and this one.
 """
 
 from __future__ import annotations

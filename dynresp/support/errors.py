@@ -1,8 +1,8 @@
 """The one error tree of dynresp.
 
 Every message says what was given, what was expected and what to do. The command line turns an
-error into a message on standard error and the exit code of its class: 2 where the user asked
-wrongly (a bad file, name or value), 1 where a right request could not be done.
+error into a message on standard error and the exit code of its class: 2 for a
+wrong request (a bad file, name or value), 1 if a right request could not be done.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import ClassVar
 
 
 class DynrespError(Exception):
-    """Root of all errors that dynresp raises on purpose; could not do what was asked."""
+    """Root of all errors that dynresp raises on purpose; the request could not be done."""
 
     exit_code: ClassVar[int] = 1
 
@@ -66,7 +66,7 @@ class FetchError(DynrespError):
 
 
 class SpecError(UsageError):
-    """An experiment, plan or library file that is wrong; the message names the key."""
+    """A spec or library file that is wrong; the message names the key."""
 
 
 class SimulationError(DynrespError):

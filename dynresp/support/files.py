@@ -1,4 +1,4 @@
-"""Writing a file so that it is either whole or not there."""
+"""Writing a file completely or not at all."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dynresp.support.errors import DynrespError
 
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """A temporary path in the same folder that becomes the file when the block ends well.
+    """A temporary path in the same folder that replaces the file if the block does not raise.
 
     The temporary name ends like the real one, since some writers choose their format by it.
     If the block raises, what was there before stays.
@@ -46,6 +46,6 @@ def replacing(path: Path | str) -> Iterator[Path]:
             f"cannot write {target}: {error.strerror or error}; choose another folder or free space"
         ) from error
     finally:
-        # Where not even the folder could be made, there is nothing to take away.
+        # If not even the folder could be made, there is nothing to remove.
         with suppress(OSError):
             temporary.unlink(missing_ok=True)

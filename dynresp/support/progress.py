@@ -1,4 +1,4 @@
-"""How far something that takes long has come."""
+"""Reporting the progress of long work."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 Progress: TypeAlias = Callable[[str, int, int], None]
-"""Called with the stage, how many are done, and of how many."""
+"""Called with the stage, how many steps are done, and of how many."""
 
 
 def no_progress(stage: str, done: int, of: int) -> None:

@@ -1,4 +1,4 @@
-"""Curves over time made smooth: averages, and smooth curves that stay above the values."""
+"""Smoothing curves over time: averages, and smooth curves that stay above the values."""
 
 from __future__ import annotations
 
