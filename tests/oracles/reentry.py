@@ -5,10 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.avatar.graph_entry import ReentryConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.rotations import FloatArray
 from tests.oracles.motion_graph import distance
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Limit and costs of an entry; see `graph_entry`."""
+
+    max_distance: float
+    waiting: float
+    other_feet: float
 
 
 @dataclass(frozen=True)
@@ -27,7 +35,7 @@ def nearest(
     pose: FloatArray,
     velocity: FloatArray,
     feet: npt.NDArray[np.bool_],
-    farthest: float,
+    max_distance: float,
 ) -> Found:
     """The frame that resembles a pose most; with the same feet standing, if one is near enough."""
     database = graph.database
@@ -39,19 +47,19 @@ def nearest(
         for kind in (same, False):
             if d < best[kind].distance:
                 best[kind] = Found(frame, d, kind)
-    return best[True] if best[True].distance <= farthest else best[False]
+    return best[True] if best[True].distance <= max_distance else best[False]
 
 
-def left_at(found: list[Found], times: FloatArray, config: ReentryConfig) -> int | None:
+def left_at(found: list[Found], times: FloatArray, costs: Costs) -> int | None:
     """The moment at which a motion is left for the graph; None where it ends out of reach."""
     best, least = None, np.inf
     for moment, (it, time) in enumerate(zip(found, times, strict=True)):
-        if it.distance > config.max_distance:
+        if it.distance > costs.max_distance:
             best, least = None, np.inf
             continue
-        cost = it.distance + config.waiting * time
+        cost = it.distance + costs.waiting * time
         if not it.same_contacts:
-            cost += config.other_feet
+            cost += costs.other_feet
         if cost < least:
             best, least = moment, cost
     return best

@@ -1,9 +1,9 @@
-"""An avatar that walks by graph, is hit, and walks on: the loop of graph and responder closed.
+"""One avatar: it walks by a motion graph, is hit, reacts, and walks on.
 
-While it walks, some seconds of its way are planned and given to its responder. Something hits it,
-and the responder takes over: simulation, blend, reaction. As soon as the blend is laid it is known
-how the reaction goes on, and the avatar looks for the moment of it and the frame of the graph that
-resemble each other most; from there it walks on, without waiting for the reaction's end.
+While it walks, the next seconds of its walk are planned and given to its responder. When something
+hits it, the responder takes over: simulation, blend, reaction. Once the blend is planned, the rest
+of the reaction is known. The avatar then finds the moment of the reaction and the frame of the
+graph that resemble each other most, and walks on from there before the reaction ends.
 """
 
 from __future__ import annotations
@@ -28,80 +28,60 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Impact
 from dynresp.response.runtime.dynamic_responder import DynamicResponder, Phase
 from dynresp.support.arrays import IntArray
-from dynresp.support.errors import UsageError
 
-# Returns that are remembered.
+AHEAD_S = 4.0
+"""The walk is planned at least so far ahead [s]. A hit looks ahead two seconds, and fitting feet
+needs as much."""
+PIECE_S = 1.0
+"""How much is planned at a time [s]."""
+# Returns that are kept.
 _RETURNS = 100
 
 
 class Planner(Protocol):
-    """What says where an avatar goes."""
+    """Decides where an avatar goes."""
 
-    def next_frames(self, frame: int, place: FloatArray, count: int) -> IntArray:
-        """Where to go on.
+    def next_frames(self, frame: int, placement: FloatArray, count: int) -> IntArray:
+        """The frames to play next.
 
         Args:
-            frame: The frame of the graph played last.
-            place: (4,) where its clip is put; see `dynresp.locomotion.graph.placement`.
+            frame: The frame of the graph that was played last.
+            placement: (4,) of its clip; see `dynresp.locomotion.graph.placement`.
             count: How many frames are wanted.
 
         Returns:
-            (k,) the next frames of the graph, at least one; about as many as are wanted.
+            (k,) the next frames of the graph: at least one, about `count`.
         """
 
 
 class RandomPlanner:
-    """Goes by the graph's probabilities (eq. 1)."""
+    """Walks at random, by the graph's probabilities (eq. 1)."""
 
     def __init__(self, graph: MotionGraph, rng: np.random.Generator) -> None:
-        """Wander by a source of chance."""
+        """Walk through a graph by a random generator."""
         self._graph = graph
         self._rng = rng
 
-    def next_frames(self, frame: int, place: FloatArray, count: int) -> IntArray:
+    def next_frames(self, frame: int, placement: FloatArray, count: int) -> IntArray:
         """See `Planner.next_frames`."""
         return random_walk(self._graph, count, self._rng, frame)
 
 
-@dataclass(frozen=True)
-class AvatarConfig:
-    """How an avatar keeps on.
-
-    Attributes:
-        ahead_s: Its way is planned for at least so long [s]. A hit looks ahead two seconds, and
-            feet are fitted with regard to as much.
-        piece_s: How much is planned at a time [s].
-    """
-
-    ahead_s: float = 4.0
-    piece_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            UsageError: One is not above 0.
-        """
-        for name in ("ahead_s", "piece_s"):
-            if not 0.0 < getattr(self, name) < float("inf"):
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
-
-
 class Activity(Enum):
-    """What an avatar does."""
+    """What an avatar is doing."""
 
     WALKING = "walking"
-    """It walks by graph, or is on its way back there: what follows is planned."""
+    """It walks by graph, or returns to it: the next frames are planned."""
     HIT = "hit"
-    """Something has hit it, or it is met where it stood; where it goes on is not known yet."""
+    """Something has hit it; where it walks on is not known yet."""
     STAYING = "staying"
-    """Its reaction ends out of the graph's reach: it lies, or, where places count (fixed
-    coordinates), stands where nobody walked. It stays so until it is hit again."""
+    """Its reaction ends out of the graph's reach: it lies, or, in fixed coordinates, stands where
+    nobody walked. It stays there until it is hit again."""
 
 
 @dataclass(frozen=True)
 class GraphReturn:
-    """How an avatar came back from a reaction, or did not.
+    """How an avatar returned from a reaction to the graph, or did not.
 
     Attributes:
         decided: Frame of the clock in which it was decided.
@@ -120,10 +100,10 @@ class Avatar:
     """One character that walks by graph.
 
     Attributes:
-        responder: Its run-time side, which is shown and hit.
-        planner: What says where it goes.
-        returns: How it came back from its last hundred reactions, in order.
-        doing: What it does.
+        responder: Plays the motion and takes the hits.
+        planner: Decides where it goes.
+        returns: How it returned from its last hundred reactions, in order.
+        activity: What it is doing.
     """
 
     def __init__(
@@ -133,17 +113,15 @@ class Avatar:
         planner: Planner,
         reentry: ReentryPlanner,
         start: int,
-        config: AvatarConfig,
     ) -> None:
-        """Begin at a frame of the graph, which the responder shows.
+        """Start at a frame of the graph, which the responder shows.
 
         Args:
             character: Its body.
             responder: At its frame 0.
-            planner: What says where it goes.
-            reentry: Finds the way back.
+            planner: Decides where it goes.
+            reentry: Finds how it returns to the graph.
             start: The frame of the graph.
-            config: Settings.
         """
         self.responder = responder
         self.planner = planner
@@ -152,15 +130,14 @@ class Avatar:
         self._character = character
         self._reentry = reentry
         self._graph = reentry.graph
-        self._config = config
         self._seen = responder.takeovers
-        # What the database holds there is how it moves, turned as the avatar is.
-        place = placement.compose(
+        # It moves as in the database, turned by the placement.
+        start_placement = placement.compose(
             placement.of_poses(responder.pose[None])[0],
             placement.inverse(self._graph.database.planar[start]),
         )
         velocity = self._graph.database.velocities[start].copy()
-        cosine, sine = np.cos(place[3]), np.sin(place[3])
+        cosine, sine = np.cos(start_placement[3]), np.sin(start_placement[3])
         velocity[:2] = np.array([[cosine, -sine], [sine, cosine]]) @ velocity[:2]
         self._stream: Stream | None = self._stream_from(
             start,
@@ -172,23 +149,23 @@ class Avatar:
 
     @property
     def standing(self) -> npt.NDArray[np.bool_] | None:
-        """(2,) which feet are to stand in the frame that is shown.
+        """(2,) which feet should stand in the frame that is shown.
 
-        None while it does not show its way through the graph: while something approaches it is
-        simulated already, if held by the pelvis, and a reaction stands as it does.
+        None unless it shows a walk by graph. From before a contact on it is simulated, and a
+        reaction has its own contacts.
         """
         shown = self.activity is Activity.WALKING and self.responder.phase is Phase.PLAYING
         return self._stream.standing(self.responder.frame) if shown and self._stream else None
 
     def plan_ahead(self) -> None:
-        """Plan what is needed before the responder's next frame."""
+        """Plan what the responder needs before its next frame."""
         responder = self.responder
         if responder.takeovers != self._seen:
             self.activity = Activity.HIT
             if responder.phase not in (Phase.BLEND, Phase.PLAYING):
                 return
             self._seen = responder.takeovers
-            self._come_back()
+            self._return_to_graph()
         if responder.phase is Phase.PHYSICS:
             self.activity = Activity.HIT
         elif self._stream is not None:
@@ -206,11 +183,11 @@ class Avatar:
         self.responder.hit(impact)
 
     def steer(self, planner: Planner) -> None:
-        """Go where another planner says, as soon as possible: from the graph's next frame on.
+        """Follow another planner as soon as possible: from the graph's next frame on.
 
         Args:
-            planner: What says where it goes from now on. While it is hit, from when the reaction
-                is blended away (`GraphConfig.blend_s` after its return) on.
+            planner: Decides where it goes from now on. During a hit it takes over once the
+                reaction is blended away (`GraphConfig.blend_s` after the return).
         """
         self.planner = planner
         free = self.responder.free_from
@@ -224,29 +201,29 @@ class Avatar:
     # -- steps ----------------------------------------------------------------------------------
 
     def _feed(self, stream: Stream, at_once: bool = False) -> None:
-        """Give the responder what it plays, as far ahead as asked for."""
+        """Give the responder what it plays next, `AHEAD_S` ahead."""
         responder, fps = self.responder, self.responder.physics.fps
-        until = responder.frame + round(self._config.ahead_s * fps)
+        until = responder.frame + round(AHEAD_S * fps)
         if stream.end >= until and not at_once:
             return
-        # What was entered late is begun, too.
-        until = max(until, stream.end) + round(self._config.piece_s * fps)
+        # Also where the graph is entered only later.
+        until = max(until, stream.end) + round(PIECE_S * fps)
         while stream.end < until:
             count = int(np.ceil((until - stream.end) / fps * self._graph.database.fps))
             stream.extend(self.planner.next_frames(stream.frame, stream.placement, count))
         self._play(stream)
 
     def _play(self, stream: Stream) -> None:
-        """Fit the feet and hand over."""
+        """Fit the feet and give the poses to the responder."""
         first, poses = stream.fitted(self.responder.frame)
         free = self.responder.free_from
         assert free is not None
-        late = max(free - first, 0)
-        motion = Motion(poses[late:], self.responder.physics.fps, "walking by graph")
-        self.responder.play(motion, first + late)
+        skip = max(free - first, 0)
+        motion = Motion(poses[skip:], self.responder.physics.fps, "walking by graph")
+        self.responder.play(motion, first + skip)
 
-    def _come_back(self) -> None:
-        """Find out when and where what it plays now goes over into the graph."""
+    def _return_to_graph(self) -> None:
+        """Decide when and where the reaction enters the graph, or that the avatar stays."""
         responder, fps = self.responder, self.responder.physics.fps
         flight, first = responder.flight, responder.free_from
         assert flight is not None
@@ -258,31 +235,31 @@ class Avatar:
         contacts = foot_contacts(self._character, self._character.kinematics(poses), fps)
         step = max(1, round(fps / self._graph.database.fps))
         moments = np.arange(first - begin, stop - begin, step)
-        way = self._reentry.find(
+        entry = self._reentry.find(
             poses[moments], velocities[moments], contacts[moments], moments / fps
         )
-        after = flight.choice.name if flight.choice is not None else "nothing"
-        if way is None:
-            self.returns.append(GraphReturn(responder.frame, None, None, after))
+        reaction = flight.choice.name if flight.choice is not None else "nothing"
+        if entry is None:
+            self.returns.append(GraphReturn(responder.frame, None, None, reaction))
             self._stream, self.activity = None, Activity.STAYING
             return
-        row = int(moments[way.moment])
+        row = int(moments[entry.moment])
         before = slice(0, row + 1)
-        self.returns.append(GraphReturn(responder.frame, begin + row, way, after))
+        self.returns.append(GraphReturn(responder.frame, begin + row, entry, reaction))
         self._stream = self._stream_from(
-            way.frame, begin, poses[before], velocities[row], contacts[before]
+            entry.frame, begin, poses[before], velocities[row], contacts[before]
         )
         self.activity = Activity.WALKING
-        before_choice = way.detour if len(way.detour) else self._recorded(way.frame)
-        if len(before_choice):
-            self._stream.extend(before_choice)
+        fixed = entry.detour if len(entry.detour) else self._recorded(entry.frame)
+        if len(fixed):
+            self._stream.extend(fixed)
         self._feed(self._stream, at_once=True)
 
     def _recorded(self, frame: int) -> IntArray:
-        """What was recorded after a frame of the graph, for as long as a blend lasts (k,).
+        """Frames recorded after a frame of the graph, for as long as a blend lasts (k,).
 
-        A jump while the reaction is blended away would drag feet that stand farther than any of the
-        graph's own.
+        A jump while the reaction is blended away would drag standing feet farther than any jump of
+        the graph does.
         """
         graph, path = self._graph, [frame]
         for _ in range(round(graph.config.blend_s * graph.database.fps)):

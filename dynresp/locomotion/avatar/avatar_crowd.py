@@ -1,4 +1,4 @@
-"""Avatars that walk by one graph, advanced together."""
+"""Several avatars that walk by one graph and are advanced together."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.avatar.avatar import Avatar, AvatarConfig, Planner, RandomPlanner
+from dynresp.locomotion.avatar.avatar import Avatar, Planner, RandomPlanner
 from dynresp.locomotion.avatar.graph_entry import ReentryPlanner
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -23,12 +23,12 @@ from dynresp.support.errors import UsageError
 
 
 class AvatarCrowd:
-    """Avatars that walk by one graph and are advanced together; their hits share batches.
+    """Avatars that walk by one graph and are advanced together; their hits are simulated together.
 
     Attributes:
-        graph: Where they walk.
+        graph: The graph by which they walk.
         avatars: The avatars.
-        crowd: Their run-time side.
+        crowd: Their responders.
     """
 
     def __init__(
@@ -38,44 +38,45 @@ class AvatarCrowd:
         graph: MotionGraph,
         planners: Sequence[Planner],
         starts: Sequence[tuple[int, npt.ArrayLike]],
-        config: AvatarConfig | None = None,
         response: ResponseConfig | None = None,
         chooser: Chooser | None = None,
         threads: int = 0,
         reentry: ReentryPlanner | None = None,
     ) -> None:
-        """Make ready.
+        """Create the avatars.
 
         Args:
-            character: The body of all of them.
+            character: The body of all avatars.
             library: Its reactions, at the simulation's frame rate.
-            graph: Where they walk, of the same character; its frame rate is at most that of the
-                simulation.
-            planners: What says where each goes.
-            starts: For each a frame of the graph, and where its clip is put (4,); see
+            graph: The graph by which they walk, of the same character, with a frame rate of at
+                most the simulation's.
+            planners: Decide where each goes.
+            starts: For each a frame of the graph and the placement (4,) of its clip; see
                 `dynresp.locomotion.graph.placement`.
-            config: Settings of the avatars.
             response: Settings of their responders.
-            chooser: What chooses reactions; None for the oracle.
+            chooser: Chooses reactions; None for the full search.
             threads: Threads for the physics, 0 for all cores.
-            reentry: Finds the way back, for several crowds of one graph; None for one of its own.
+            reentry: Finds how they return to the graph. Pass one to share it among crowds of one
+                graph; None makes one.
 
         Raises:
-            UsageError: The graph is another character's or too fast, a start is not in it, or there
-                are not as many planners as starts.
+            UsageError: The graph belongs to another character or has too high a frame rate, a start
+                is not in it, or the numbers of planners and starts differ.
             MotionError: There is no avatar, or the library has another frame rate.
         """
         settings = response or ResponseConfig()
         fps = settings.physics.fps
         if graph.database.character != character.identity:
-            raise UsageError("the graph was made of another character's motions; build it anew")
+            raise UsageError("the graph was made of another character's motions; build it again")
         if graph.database.fps > fps:
             raise UsageError(
                 f"the graph has {graph.database.fps:g} fps, the simulation {fps:g}; build the "
                 "graph with as many or fewer"
             )
         if len(planners) != len(starts):
-            raise UsageError(f"{len(starts)} starts and {len(planners)} planners were given")
+            raise UsageError(
+                f"{len(starts)} starts and {len(planners)} planners were given; give one of each an avatar"
+            )
         for frame, _ in starts:
             check_in_component(graph, frame)
         self.graph = graph
@@ -86,7 +87,7 @@ class AvatarCrowd:
         self.crowd = Crowd(character, library, bases, settings, chooser, threads)
         reentry = reentry or ReentryPlanner(graph, character)
         self.avatars = tuple(
-            Avatar(character, responder, planner, reentry, frame, config or AvatarConfig())
+            Avatar(character, responder, planner, reentry, frame)
             for responder, planner, (frame, _) in zip(
                 self.crowd.responders, planners, starts, strict=True
             )
@@ -96,13 +97,13 @@ class AvatarCrowd:
     def wandering(
         cls, graph: MotionGraph, library: ReactionLibrary, count: int = 1, seed: int = 0
     ) -> AvatarCrowd:
-        """Avatars that start anywhere in a graph, over the origin, and walk at random.
+        """Avatars that start at random frames, at the origin, and walk at random.
 
         Args:
-            graph: Where they walk; a graph of the product's own character.
+            graph: The graph by which they walk, of the product's own character.
             library: Its reactions, at 30 frames a second.
-            count: How many.
-            seed: Seed of their starts and of their walks.
+            count: Number of avatars.
+            seed: Seed of their starts and walks.
 
         Raises:
             UsageError: The graph was made of another character's motions.
@@ -116,10 +117,10 @@ class AvatarCrowd:
         return cls(default_character(), library, graph, planners, starts)
 
     def advance(self) -> FloatArray:
-        """Go on by one frame.
+        """Advance by one frame.
 
         Returns:
-            (avatars, 59) what they show.
+            (avatars, 59) their poses.
         """
         for avatar in self.avatars:
             avatar.plan_ahead()

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynresp.locomotion.avatar.avatar import Activity, Avatar, AvatarConfig
+from dynresp.locomotion.avatar.avatar import Activity, Avatar
 from dynresp.locomotion.avatar.avatar_crowd import AvatarCrowd
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -36,7 +36,7 @@ class Straight:
         self.graph = graph
         self.asked: list[int] = []
 
-    def next_frames(self, frame: int, place: FloatArray, count: int) -> npt.NDArray[np.int32]:
+    def next_frames(self, frame: int, placement: FloatArray, count: int) -> npt.NDArray[np.int32]:
         self.asked.append(frame)
         path = []
         for _ in range(count):
@@ -308,5 +308,3 @@ def test_what_does_not_fit_is_refused(
     fast = walking_graph(character, fps=60.0)
     with pytest.raises(UsageError, match="the graph has 60 fps, the simulation 30"):
         AvatarCrowd(character, library, fast, [Straight(fast)], [(int(fast.frames[0]), place)])
-    with pytest.raises(UsageError, match="ahead_s must be above 0, got 0"):
-        AvatarConfig(ahead_s=0.0)

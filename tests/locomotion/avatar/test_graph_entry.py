@@ -1,11 +1,10 @@
-"""The way back into a graph, against its slow twin and on made falls."""
-
-from dataclasses import replace
+"""The entry back into a graph, against its slow twin and on made falls."""
 
 import numpy as np
 import pytest
 
-from dynresp.locomotion.avatar.graph_entry import ReentryConfig, ReentryPlanner
+from dynresp.locomotion.avatar import graph_entry
+from dynresp.locomotion.avatar.graph_entry import ReentryPlanner
 from dynresp.locomotion.avatar.pose_index import EntryIndex
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
@@ -14,7 +13,7 @@ from dynresp.motion.character import ROOT, ROOT_QUAT, Character
 from dynresp.motion.feet import legs
 from dynresp.motion.motion import Motion, interpolate, pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.errors import MotionError, UsageError
+from dynresp.support.errors import MotionError
 from tests.locomotion.graph.graph_samples import made_database, wandering_poses
 from tests.locomotion.samples import walking_graph, walking_motions
 from tests.oracles import reentry as oracle
@@ -65,28 +64,34 @@ def test_the_nearest_frames_are_those_of_the_slow_twin(
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_moment_and_frame_are_found_together(character: Character, seed: int) -> None:
+def test_moment_and_frame_are_found_together(
+    character: Character, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng(seed)
     graph = _graph(rng, Coordinates.RELATIVE)
-    config = ReentryConfig(max_distance=0.6, waiting=0.1, apart=0.0)
-    planner = ReentryPlanner(graph, character, config)
+    costs = oracle.Costs(max_distance=0.6, waiting=0.1, other_feet=0.3)
+    monkeypatch.setattr(graph_entry, "MAX_DISTANCE", costs.max_distance)
+    monkeypatch.setattr(graph_entry, "WAITING_COST", costs.waiting)
+    monkeypatch.setattr(graph_entry, "OTHER_FEET_COST", costs.other_feet)
+    monkeypatch.setattr(graph_entry, "FOOT_OFFSET_COST", 0.0)
+    planner = ReentryPlanner(graph, character)
     poses, velocities, contacts = _moments(rng, graph)
     times = np.arange(len(poses)) / 5.0
     found = [
         oracle.nearest(
             graph, character.joint_names, planner.entries.frames.tolist(),
-            poses[row], velocities[row], contacts[row], config.max_distance,
+            poses[row], velocities[row], contacts[row], costs.max_distance,
         )
         for row in range(len(poses))
     ]  # fmt: skip
-    way = planner.find(poses, velocities, contacts, times)
-    moment = oracle.left_at(found, times, config)
-    assert way is not None
+    entry = planner.find(poses, velocities, contacts, times)
+    moment = oracle.left_at(found, times, costs)
+    assert entry is not None
     assert moment is not None
-    assert (way.moment, way.frame) == (moment, found[moment].frame)
-    assert way.distance == pytest.approx(found[moment].distance, abs=1e-9)
-    assert way.same_contacts == found[moment].same_contacts
-    assert not len(way.detour)
+    assert (entry.moment, entry.frame) == (moment, found[moment].frame)
+    assert entry.distance == pytest.approx(found[moment].distance, abs=1e-9)
+    assert entry.same_contacts == found[moment].same_contacts
+    assert not len(entry.detour)
 
 
 def _ankles(character: Character, poses: FloatArray) -> FloatArray:
@@ -98,17 +103,25 @@ def _ankles(character: Character, poses: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_feet_count_as_far_as_they_are_apart(character: Character, seed: int) -> None:
-    """Moment and frame are the best of all that were considered, one by one."""
+def test_the_distance_between_feet_counts(
+    character: Character, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Moment and frame are the best of all candidates, compared one by one."""
     rng = np.random.default_rng(seed)
     graph = _graph(rng, Coordinates.RELATIVE)
-    config = ReentryConfig(max_distance=0.6, waiting=0.1, apart=0.5, candidates=150)
-    planner = ReentryPlanner(graph, character, config)
+    for name, value in (
+        ("MAX_DISTANCE", 0.6),
+        ("WAITING_COST", 0.1),
+        ("FOOT_OFFSET_COST", 0.5),
+        ("CANDIDATES", 150),
+    ):
+        monkeypatch.setattr(graph_entry, name, value)
+    planner = ReentryPlanner(graph, character)
     poses, velocities, contacts = _moments(rng, graph)
     poses, velocities, contacts = (x[3:] for x in (poses, velocities, contacts))
     times = np.arange(len(poses)) / 5.0
-    way = planner.find(poses, velocities, contacts, times)
-    assert way is not None
+    entry = planner.find(poses, velocities, contacts, times)
+    assert entry is not None
     own, theirs = (_ankles(character, x) for x in (poses, graph.database.poses))
     costs = {}
     for moment in range(len(poses)):
@@ -120,12 +133,12 @@ def test_feet_count_as_far_as_they_are_apart(character: Character, seed: int) ->
             d = distance(moving, recorded, character.joint_names, graph.config)
             apart = np.linalg.norm(own[moment] - theirs[frame], axis=-1).max()
             costs[moment, frame] = d + 0.1 * times[moment] + 0.5 * apart
-    assert way.same_contacts
-    assert (way.moment, way.frame) == min(costs, key=costs.__getitem__)
-    plain = ReentryPlanner(graph, character, replace(config, apart=0.0))
-    nearest = plain.find(poses, velocities, contacts, times)
+    assert entry.same_contacts
+    assert (entry.moment, entry.frame) == min(costs, key=costs.__getitem__)
+    monkeypatch.setattr(graph_entry, "FOOT_OFFSET_COST", 0.0)
+    nearest = planner.find(poses, velocities, contacts, times)
     assert nearest is not None
-    assert nearest.distance <= way.distance + 0.1 * (len(poses) - 1) / 5.0
+    assert nearest.distance <= entry.distance + 0.1 * (len(poses) - 1) / 5.0
 
 
 @pytest.mark.parametrize("count", [1, 5, 500])
@@ -134,7 +147,7 @@ def test_several_begin_with_the_nearest(character: Character, count: int) -> Non
     graph = _graph(rng, Coordinates.RELATIVE)
     index = EntryIndex(graph)
     moments = _moments(rng, graph)
-    nearest, several = index.nearest(*moments), index.several(*moments, count)
+    nearest, several = index.nearest(*moments), index.nearest_several(*moments, count)
     assert several.frames.shape == several.distances.shape == (len(moments[0]), count)
     np.testing.assert_array_equal(several.frames[:, 0], nearest.frames)
     assert (several.distances >= several.distances[:, :1] - 1e-12).all()
@@ -155,7 +168,7 @@ def test_every_entry_is_followed_by_a_frame_of_the_component(character: Characte
 
 
 def _down(character: Character, base: Motion, seconds: float = 1.0) -> Motion:
-    """From the first pose of a motion down onto the back, in a straight way."""
+    """From the first pose of a motion down onto the back, in a straight line."""
     down = base.poses[0].copy()
     down[2] = 0.15
     down[ROOT_QUAT] = rotations.multiply(
@@ -182,14 +195,16 @@ def test_a_fall_is_not_left_before_it_is_over(character: Character) -> None:
     planner = ReentryPlanner(walking_graph(character), character)
     down = _down(character, walking_motions(character)[0].resampled(15.0))
     there_and_back = Motion(np.concatenate([down.poses, down.poses[::-1]]), down.fps)
-    way = _find(planner, there_and_back)
-    assert way is not None
-    assert way.moment > len(down)
-    assert way.distance < planner.config.max_distance
+    entry = _find(planner, there_and_back)
+    assert entry is not None
+    assert entry.moment > len(down)
+    assert entry.distance < graph_entry.MAX_DISTANCE
 
 
 @pytest.mark.parametrize("ends", ["where others walk", "in the air"])
-def test_a_recording_of_getting_up_brings_back_who_lies(character: Character, ends: str) -> None:
+def test_a_recording_of_getting_up_brings_back_who_lies(
+    character: Character, ends: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     motions = walking_motions(character)
     walk = motions[0].resampled(15.0)
     down = _down(character, walk, 2.0)
@@ -198,26 +213,24 @@ def test_a_recording_of_getting_up_brings_back_who_lies(character: Character, en
         up = np.concatenate([up, walk.poses[1:]])
     graph = MotionGraph.build([*motions, Motion(up, 15.0, "up")], GraphConfig(), character)
     planner = ReentryPlanner(graph, character)
-    way = _find(planner, down)
-    assert way is not None
+    entry = _find(planner, down)
+    assert entry is not None
     clip = graph.database.clips[-1]
-    assert way.moment == len(down) - 1
-    assert way.frame == clip.start
-    assert way.distance < 0.05
+    assert entry.moment == len(down) - 1
+    assert entry.frame == clip.start
+    assert entry.distance < 0.05
     # Through the recording frame by frame, then into the component.
-    inside = np.isin(way.detour, graph.frames)
+    inside = np.isin(entry.detour, graph.frames)
     assert not inside[:-1].any()
     assert inside[-1]
-    np.testing.assert_array_equal(way.detour[:-1], clip.start + 1 + np.arange(len(way.detour) - 1))
-    assert len(way.detour) > 10
-    far = replace(planner.config, farthest_lying=0.0)
-    assert _find(ReentryPlanner(graph, character, far), down) is None
+    np.testing.assert_array_equal(
+        entry.detour[:-1], clip.start + 1 + np.arange(len(entry.detour) - 1)
+    )
+    assert len(entry.detour) > 10
+    monkeypatch.setattr(graph_entry, "MAX_LYING_DISTANCE", 0.0)
+    assert _find(planner, down) is None
 
 
-def test_numbers_that_make_no_sense_are_refused(character: Character) -> None:
-    with pytest.raises(UsageError, match="waiting must be at least 0, got -1"):
-        ReentryConfig(waiting=-1.0)
-    with pytest.raises(UsageError, match="candidates must be at least 1, got 0"):
-        ReentryConfig(candidates=0)
+def test_an_index_needs_a_frame(character: Character) -> None:
     with pytest.raises(MotionError, match="at least one frame"):
         EntryIndex(walking_graph(character), [])
