@@ -27,7 +27,7 @@ from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.graph_file import load_graph, save_graph
 from dynresp.locomotion.graph.motion_graph import MotionGraph
-from dynresp.locomotion.graph.pruning import find_transitions
+from dynresp.locomotion.graph.pruning import find_jumps
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.playing.composition import compose
@@ -151,7 +151,7 @@ def _check_agreement(
     Raises:
         DynrespError: The jumps differ.
     """
-    found = find_transitions(database, LOOSE)
+    found = find_jumps(database, LOOSE)
     matched = found.targets - 1
     farthest = LOOSE.max_distance - _ROUNDING
     for block in blocks:

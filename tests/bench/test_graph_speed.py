@@ -11,7 +11,7 @@ from dynresp.bench import graph_speed as bench
 from dynresp.bench.graph_database import database_of
 from dynresp.bench.numpy_pruning_twin import NumpyPruning
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.pruning import Transitions, find_transitions
+from dynresp.locomotion.graph.pruning import Jumps, find_jumps
 from dynresp.motion import rotations
 from dynresp.support.errors import DynrespError
 from tests.locomotion.graph.graph_samples import made_database
@@ -60,7 +60,7 @@ def test_numpy_finds_what_is_found(
         block = twin.block(start, min(start + 67, len(database)))
         first, second = np.nonzero(twin.jumps(block))
         jumps |= set(zip((first + start).tolist(), second.tolist(), strict=True))
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     pairs = zip(found.sources.tolist(), (found.targets - 1).tolist(), strict=True)
     expected = {(i, j) for i, j in pairs if i < j}
     assert len(expected) > 10
@@ -71,7 +71,7 @@ def test_times_are_refused_where_the_sides_disagree(monkeypatch: pytest.MonkeyPa
     database = made_database(np.random.default_rng(3), (120, 110), alike=0.02)
     twin = NumpyPruning.of(database, bench.LOOSE)
     blocks = [twin.block(20, 70)]
-    found = find_transitions(database, bench.LOOSE)
+    found = find_jumps(database, bench.LOOSE)
     bench._check_agreement(database, twin, blocks)
     inside = (found.sources >= 20) & (found.sources < 70) & (found.targets > found.sources + 1)
     for change in (np.flatnonzero(inside)[:1], np.flatnonzero(inside)[-1:]):
@@ -89,9 +89,9 @@ def test_times_are_refused_where_the_sides_disagree(monkeypatch: pytest.MonkeyPa
     refused(monkeypatch, more, database, twin, blocks)
 
 
-def refused(monkeypatch: pytest.MonkeyPatch, changed: Transitions, *checked: object) -> None:
+def refused(monkeypatch: pytest.MonkeyPatch, changed: Jumps, *checked: object) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(bench, "find_transitions", lambda *_: changed)
+        patch.setattr(bench, "find_jumps", lambda *_: changed)
         with pytest.raises(DynrespError, match="NumPy finds other jumps"):
             bench._check_agreement(*checked)  # type: ignore[arg-type]
 

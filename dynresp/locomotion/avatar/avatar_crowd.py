@@ -75,7 +75,8 @@ class AvatarCrowd:
             )
         if len(planners) != len(starts):
             raise UsageError(
-                f"{len(starts)} starts and {len(planners)} planners were given; give one of each an avatar"
+                f"{len(starts)} starts and {len(planners)} planners were given; "
+                "give one of each for every avatar"
             )
         for frame, _ in starts:
             check_in_component(graph, frame)

@@ -1,4 +1,4 @@
-"""The recorded frames that a motion graph is made of (Lee et al. 2002, section 3)."""
+"""The recorded frames of a motion graph, clip by clip (Lee et al. 2002, section 3)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dynresp.support.arrays import BoolArray, IntArray, frozen
 from dynresp.support.errors import MotionError
 
 CONTACTS = ("left foot", "right foot", "left hand", "right hand")
-"""What the columns of contacts stand for; a database has the first two, or all four."""
-# The column that each becomes in a mirror.
+"""Columns of contacts; a database has the first two, or all four."""
+# For each column the one that it becomes when mirrored.
 _MIRRORED = [1, 0, 3, 2]
 
 
@@ -28,10 +28,10 @@ class Clip:
     """Frames that were recorded one after the other.
 
     Attributes:
-        name: Of the motion.
+        name: Name of the motion.
         start: Its first frame in the database.
-        stop: One past its last.
-        identity: Short hash of its poses, contacts and frame rate as they were given.
+        stop: One past its last frame.
+        identity: Short hash of the motion's poses, contacts and frame rate; see `motion_identity`.
     """
 
     name: str
@@ -42,19 +42,19 @@ class Clip:
 
 @dataclass(frozen=True, eq=False)
 class MotionDatabase:
-    """Clips of one character at one frame rate, laid end to end. Arrays are read-only.
+    """Clips of one character at one frame rate, one after the other. Arrays are read-only.
 
     Attributes:
         poses: (n, 59) rows of `qpos`, each clip in its own world; w x y z, metres, Z up.
-        contacts: (n, 2 or 4) what touches the environment: see `CONTACTS`.
+        contacts: (n, 2 or 4) which feet, and hands, touch the environment; see `CONTACTS`.
         fps: Frames per second.
         clips: The clips, in the order of their frames.
         character: `Character.identity` of the character.
-        credits: To whom the motions are owed, a line each.
-        world: Name of the world that they were recorded in; "flat" is level ground.
+        credits: Credits of the motions, a line each.
+        world: Name of the world in which they were recorded; "flat" is level ground.
 
     Raises:
-        MotionError: Shapes do not fit together, or there is no frame.
+        MotionError: Shapes do not match, or there is no frame.
     """
 
     poses: FloatArray
@@ -92,22 +92,22 @@ class MotionDatabase:
         contacts: Sequence[BoolArray] | None = None,
         credit_lines: tuple[str, ...] = (),
     ) -> MotionDatabase:
-        """Bring motions to one frame rate and lay them end to end.
+        """Resample motions to one frame rate and join them.
 
-        A motion given twice is taken once: its copy would only offer transitions that change
-        nothing. One that is shorter than three frames drops out.
+        A motion given twice is used once: jumps to its copy would change nothing. Motions shorter
+        than three frames are left out.
 
         Args:
             motions: The motions, at any frame rate.
-            character: Whose they are.
-            fps: Frame rate; the paper's is 15 (section 6).
+            character: The character of the motions.
+            fps: Frame rate of the database; the paper's is 15 (section 6).
             mirrored: Whether every motion is followed by its mirror image.
-            contacts: For each motion (frames, 2 or 4) what touches the environment, at the
-                motion's own rate; by default the motions' foot contacts.
+            contacts: For each motion (frames, 2 or 4) which feet, and hands, touch the
+                environment, at the motion's own rate; by default the motions' foot contacts.
             credit_lines: `credits` of the database.
 
         Raises:
-            MotionError: What was given are no motions, or there is none long enough.
+            MotionError: An item is no motion, or no motion is long enough.
         """
         listed = isinstance(motions, Sequence)
         if not listed or not all(isinstance(motion, Motion) for motion in motions):
@@ -178,7 +178,7 @@ class MotionDatabase:
 
     @functools.cached_property
     def clip_of(self) -> IntArray:
-        """(n,) the clip to which each frame belongs."""
+        """(n,) index of each frame's clip."""
         lengths = [clip.stop - clip.start for clip in self.clips]
         return frozen(np.repeat(np.arange(len(self.clips), dtype=np.int32), lengths))
 

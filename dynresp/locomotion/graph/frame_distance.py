@@ -1,25 +1,25 @@
-"""How unlike two frames are (Lee et al. 2002, section 4.1, eq. 2 and 3).
+"""Distances between frames: how unlike they are (Lee et al. 2002, section 4.1, eq. 2 and 3).
 
     D_ij = d(p_i, p_j) + nu d(v_i, v_j)
     d(p_i, p_j) = |p_i,0 - p_j,0|^2 + sum_k w_k |log(q_j,k^-1 q_i,k)|^2
 
-The logarithm is the half-angle vector, the shorter way round, so a term is half an angle squared.
-d(v_i, v_j) is the squared difference of the rates of what eq. 3 measures: metres and half radians
-a second, with the same weights. Then nu is a time squared: with nu = 0.0225 s^2 a difference of
-rates counts as the gap that it opens within 0.15 s.
+The logarithm is the half-angle vector of the shorter turn, so a term is half an angle, squared.
+d(v_i, v_j) is the squared difference of the rates of the quantities of eq. 3: metres and half
+radians a second, with the same weights. So nu is a time squared: with nu = 0.0225 s^2 a difference
+of rates counts as much as the difference in pose that it causes within 0.15 s.
 
-Metres and half radians count alike, as in the paper. It is a fair rate: the far end of a limb half
-a metre long moves by x metres where its joint turns by x half radians.
+A metre and a half radian count alike, as in the paper. The end of a limb half a metre long moves by
+x metres if its joint turns by x half radians.
 
-Where frames may be laid over each other, the distance is the one that is left when frame j has
-been laid over frame i as its clip would be placed after a jump:
+The distance is taken after frame j has been moved onto frame i as far as its clip would be moved by
+a jump:
 
-- `Coordinates.FIXED`: it stays where it is.
-- `Coordinates.RELATIVE`: it is turned and shifted to i's place on the ground and i's yaw. Height,
-  tilt and velocity in the facing frame are left.
+- `Coordinates.FIXED`: it is not moved.
+- `Coordinates.RELATIVE`: it is turned and shifted to i's yaw and position on the ground. Height,
+  tilt and velocity in the facing frame still count.
 - `Coordinates.BLOCKS`: it is turned by the quarter turns nearest to the difference of yaw, then
-  shifted by the whole blocks nearest to the difference of place and height. The rest counts as in
-  fixed coordinates. The world's origin lies at a corner or in the middle of a block.
+  shifted by the whole blocks nearest to the difference of position and height. The rest counts as
+  in fixed coordinates. The world's origin is at a corner or in the middle of a block.
 
 The distance is the same from i to j as from j to i, and zero from a frame to itself.
 """
@@ -53,20 +53,20 @@ _QUARTERS = rotations.from_yaw(_QUARTER * np.arange(4))
 
 @dataclass(frozen=True, eq=False)
 class FrameFeatures:
-    """What the distance compares, frame by frame. Arrays are read-only.
+    """The numbers of each frame that the distance compares. Arrays are read-only.
 
-    In relative coordinates positions, orientations and linear velocities are those of a frame that
-    was placed over the world's origin, facing +X; else they are the frame's own.
+    In relative coordinates positions, orientations and linear velocities are those after the frame
+    was moved to the world's origin, facing +X; otherwise they are the frame's own.
 
     Attributes:
-        config: Says coordinates, nu and the size of blocks.
+        config: Gives coordinates, nu and the size of blocks.
         positions: (n, 3) of the root [m]; in relative coordinates x and y are zero.
         orientations: (n, 4) of the root, w x y z.
-        yaws: (n,) facing of the root, before any placing [rad].
+        yaws: (n,) yaw of the root before it was moved [rad].
         joints: (n, 10, 4) rotations of the joints of weight 1, w x y z.
-        linear: (n, 3) velocity of the root times the root of nu [m].
+        linear: (n, 3) velocity of the root times the square root of nu [m].
         rates: (n, 33) half the angular velocities of the root, in its own frame, and of the
-            joints of weight 1, times the root of nu [half radians].
+            joints of weight 1, times the square root of nu [half radians].
     """
 
     config: GraphConfig
@@ -96,16 +96,16 @@ class FrameFeatures:
 def frame_features(
     poses: npt.ArrayLike, velocities: npt.ArrayLike, config: GraphConfig
 ) -> FrameFeatures:
-    """Bring frames into the form in which they are compared.
+    """Compute the numbers by which frames are compared.
 
     Args:
         poses: (n, 59) rows of `qpos`.
         velocities: (n, 45) rows of `qvel`: root linear in the world [m/s], root angular in the
             root's frame, joints in the child's frame [rad/s].
-        config: Says coordinates, nu and the size of blocks.
+        config: Gives coordinates, nu and the size of blocks.
 
     Raises:
-        MotionError: Shapes do not fit, or a number is not finite.
+        MotionError: Shapes do not match, or a number is not finite.
     """
     rows = as_poses(poses)
     n = len(rows)
@@ -144,7 +144,7 @@ def frame_distances(
     """Distances D of pairs of frames (eq. 2).
 
     Args:
-        features: Of all frames.
+        features: Features of all frames.
         first: (...,) indices i.
         second: (...,) indices j; shapes broadcast.
 
@@ -173,19 +173,19 @@ def quarter_turned(features: FrameFeatures) -> tuple[FloatArray, FloatArray, Flo
     """Roots of all frames after none, one, two and three quarter turns about the vertical.
 
     Returns:
-        Positions (n, 4, 3), brought near the origin by whole blocks; orientations (n, 4, 4);
+        Positions (n, 4, 3), moved near the origin by whole blocks; orientations (n, 4, 4);
         linear velocities (n, 4, 3), scaled as in `FrameFeatures`.
     """
-    places = rotations.rotate(_QUARTERS, features.positions[:, None])
-    places -= features.cell * np.round(places / features.cell)
+    positions = rotations.rotate(_QUARTERS, features.positions[:, None])
+    positions -= features.cell * np.round(positions / features.cell)
     orientations = rotations.multiply(_QUARTERS, features.orientations[:, None])
-    return places, orientations, rotations.rotate(_QUARTERS, features.linear[:, None])
+    return positions, orientations, rotations.rotate(_QUARTERS, features.linear[:, None])
 
 
 def _half_squared(a: FloatArray, b: FloatArray) -> FloatArray:
     """|log(b^-1 a)|^2 with the half-angle logarithm: half the angle between rotations, squared.
 
-    The angle comes from chords, which keep their digits near zero and pass over no sign.
+    The angle is computed from chords, which are exact near zero and independent of signs.
     """
     near, far = np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)
     half: FloatArray = 2.0 * np.arctan2(np.minimum(near, far), np.maximum(near, far))

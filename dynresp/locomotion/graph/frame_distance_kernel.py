@@ -1,10 +1,11 @@
-"""The compiled inner loop of the search for frames that resemble each other.
+"""Compiled search for pairs of frames that resemble each other.
 
 Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. Two passes over the pairs of a row: a sketch of 16 numbers a frame, whose squared distance
-is never above the distance of the frames, drops most of them in long vectors; the rest is computed
-in full. Every pair is computed once, by the same instructions wherever its row begins, so that the
-result does not depend on how rows are shared out among threads.
+is used. There are two passes over the pairs of a row. The first drops most pairs by a lower bound:
+each frame has a vector of 16 numbers, and the squared distance of two vectors is never above the
+distance of the frames. The second computes the remaining distances in full. Every pair is computed
+once, by the same instructions wherever its row begins, so the result does not depend on how rows
+are divided among threads.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from dynresp.support.compiling import compiled
 from dynresp.support.growing_kernel import doubled
 
 LANES = 16
-"""Rotations of a frame, filled up with the identity: one vector."""
+"""Rotations of a frame, padded with the identity: one vector."""
 
-SKETCH = 16
-"""Numbers of a sketch; a multiple of four."""
+BOUND_SIZE = 16
+"""Numbers of a bound vector; a multiple of four."""
 
 PARTS = 7
 """Rows of LANES numbers in a packed frame: the four parts of its quaternions, then three for
 positions and velocities."""
 
-# Half an angle squared over the squared chord u = |q - q'|^2 on 0 <= u <= 2: weighted least
-# squares driven to the smallest largest relative error, 4e-7 in float32.
+# Half an angle squared, divided by the squared chord u = |q - q'|^2, on 0 <= u <= 2: a polynomial
+# fitted for the smallest largest relative error, 4e-7 in float32.
 _G0 = np.float32(1.0000002)
 _G1 = np.float32(0.083320074)
 _G2 = np.float32(0.011211397)
@@ -40,7 +41,7 @@ _G6 = np.float32(7.2013143e-05)
 _ZERO = np.float32(0.0)
 _ONE = np.float32(1.0)
 _QUARTER = np.float32(0.5 * math.pi)
-# Pairs that are sketched at once: what they need stays in the nearest cache.
+# Pairs that are bounded at once: their data stays in the nearest cache.
 _RUN = 256
 
 _SIGNATURE = types.Tuple((types.int64[::1], types.int32[::1], types.float32[::1]))(
@@ -70,12 +71,12 @@ def _half_squared(aw, ax, ay, az, bw, bx, by, bz):
 
 
 @njit(inline="always")
-def _sketched(sketch, own, start, count, sums):
-    """Squared distances of sketches from one of them."""
-    for d in range(0, SKETCH, 4):
-        x0, x1, x2, x3 = sketch[d, own], sketch[d + 1, own], sketch[d + 2, own], sketch[d + 3, own]
-        r0, r1 = sketch[d, start : start + count], sketch[d + 1, start : start + count]
-        r2, r3 = sketch[d + 2, start : start + count], sketch[d + 3, start : start + count]
+def _lower_bounds(bounds, own, start, count, sums):
+    """Squared distances of bound vectors from one of them."""
+    for d in range(0, BOUND_SIZE, 4):
+        x0, x1, x2, x3 = bounds[d, own], bounds[d + 1, own], bounds[d + 2, own], bounds[d + 3, own]
+        r0, r1 = bounds[d, start : start + count], bounds[d + 1, start : start + count]
+        r2, r3 = bounds[d + 2, start : start + count], bounds[d + 3, start : start + count]
         for t in range(count):
             e0, e1, e2, e3 = r0[t] - x0, r1[t] - x1, r2[t] - x2, r3[t] - x3
             part = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
@@ -89,37 +90,36 @@ def close_pairs(
     place_of,
     group_stops,
     frame_of,
-    sketch,
+    bounds,
     packed,
     yaws,
     turned,
     cell,
-    bound,
+    max_bound,
     max_distance,
 ):
-    """Pairs (i, j), j not before i, of frames of one group that are no farther apart than allowed.
+    """Pairs (i, j), i <= j, of frames of one group that are at most `max_distance` apart.
 
-    Frames of a group lie side by side, ascending; a frame in no group has no pairs. Every other
-    frame has itself for the first of its row.
+    The frames of a group are stored side by side, ascending. A frame in no group has no pairs. The
+    first pair of every other frame is the one with itself.
 
     Args:
         first: First row.
-        stop: One past the last.
+        stop: One past the last row.
         place_of: (n,) place of each frame in the arrays below, -1 where it is in no group.
         group_stops: (n,) one past the last place of each frame's group.
         frame_of: (m,) frame at each place.
-        sketch: (SKETCH, m).
-        packed: (m, PARTS, LANES).
-        yaws: (m,) facing [rad].
+        bounds: (BOUND_SIZE, m) the bound vectors.
+        packed: (m, PARTS, LANES) the numbers of each frame.
+        yaws: (m,) yaw of the root [rad].
         turned: (m, 4, 10) roots after none to three quarter turns: position, quaternion w x y z,
-            linear velocity. Without rows where coordinates are no blocks; else the root is left
-            out of `packed`.
+            linear velocity. With blocks, `packed` has no root; otherwise this has no rows.
         cell: (3,) size of a block [m].
-        bound: Largest squared distance of sketches.
-        max_distance: Largest distance.
+        max_bound: Largest squared distance of bound vectors.
+        max_distance: Largest distance of a pair.
 
     Returns:
-        Where rows begin (stop - first + 1,), the frames j, and the distances.
+        Where rows begin (stop - first + 1,), the frames j (pairs,), and the distances (pairs,).
     """
     offsets = np.zeros(stop - first + 1, np.int64)
     columns = np.empty(4096, np.int32)
@@ -128,7 +128,7 @@ def close_pairs(
     candidates = np.empty(_RUN, np.int64)
     found = 0
     on_blocks = turned.shape[0] > 0
-    # Not known when this is compiled: loops over constants are unrolled before they are vectors.
+    # Read at run time: loops over constants would be unrolled instead of vectorised.
     lanes = packed.shape[2]
     for i in range(first, stop):
         own = place_of[i]
@@ -138,11 +138,11 @@ def close_pairs(
         a = packed[own]
         for start in range(own, group_stops[i], _RUN):
             count = min(_RUN, group_stops[i] - start)
-            _sketched(sketch, own, start, count, sums)
+            _lower_bounds(bounds, own, start, count, sums)
             left = 0
             for t in range(count):
                 candidates[left] = start + t
-                left += sums[t] <= bound
+                left += sums[t] <= max_bound
             if found + left > len(columns):
                 columns, distances = doubled(columns), doubled(distances)
             for t in range(left):
@@ -160,10 +160,10 @@ def close_pairs(
                     p, q = turned[own, 0], turned[place, turn]
                     total += _half_squared(p[3], p[4], p[5], p[6], q[3], q[4], q[5], q[6])
                     for k in range(3):
-                        apart = p[k] - q[k]
-                        apart -= cell[k] * np.rint(apart / cell[k])
-                        faster = p[k + 7] - q[k + 7]
-                        total += apart * apart + faster * faster
+                        offset = p[k] - q[k]
+                        offset -= cell[k] * np.rint(offset / cell[k])
+                        speed = p[k + 7] - q[k + 7]
+                        total += offset * offset + speed * speed
                 columns[found] = frame_of[place]
                 distances[found] = total
                 found += total <= max_distance

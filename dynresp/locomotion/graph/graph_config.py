@@ -14,14 +14,14 @@ from dynresp.support.errors import UsageError
 
 
 class Coordinates(Enum):
-    """In what world frames are compared (Lee et al. 2002, section 4.1.2)."""
+    """Coordinates in which frames are compared (Lee et al. 2002, section 4.1.2)."""
 
     RELATIVE = "relative"
-    """Anywhere on level ground, facing anywhere: position on the ground and yaw do not count."""
+    """Position on the ground and yaw are ignored: level ground, any direction."""
     FIXED = "fixed"
-    """In the world of the recording, where things stand in their places."""
+    """Positions in the world of the recording, where objects have fixed positions."""
     BLOCKS = "blocks"
-    """On a grid of blocks: whole blocks along and up, and quarter turns, do not count."""
+    """A grid of blocks: whole blocks along and up, and quarter turns, are ignored."""
 
 
 class Limits(NamedTuple):
@@ -59,31 +59,31 @@ _KINDS: dict[str, tuple[Callable[[object], bool], str]] = {
 
 @dataclass(frozen=True)
 class GraphConfig:
-    """How a motion graph is made. Numbers are within `LIMITS`.
+    """Settings by which a motion graph is built. Numbers are within `LIMITS`.
 
     Attributes:
         fps: Frame rate of its frames [1/s]; the paper's is 15.
-        mirrored: Whether the mirror image of every motion belongs to it.
-        coordinates: In what world frames are compared.
-        contact_change: Whether jumps are allowed only where a contact begins or ends, the strict
+        mirrored: Whether the mirror image of every motion is added.
+        coordinates: Coordinates in which frames are compared.
+        contact_change: Whether jumps are allowed only where a contact begins or ends: the strict
             form of the first pruning rule.
         sigma: Distance at which the probability has fallen to 1/e (eq. 1).
-        least_probability: Jumps with exp(-D / sigma) below it are dropped, the second rule.
+        least_probability: Jumps with exp(-D / sigma) below it are dropped: the second rule.
         velocity_weight: Weight of squared velocity differences [s^2], the nu of eq. 2: the square
             of the time, here 0.15 s, in which a difference in velocity counts as much as the
             difference in pose that it leads to. Angles and their rates are halved, as in eq. 3.
-        local_maxima: Whether of neighbouring jumps only the best stays, the third rule. None
-            does what the paper does: not where contact_change already leaves single ones.
-        stutter_s: Jumps within a clip that skip or repeat less than this are none [s].
-        slip_m: A jump is dropped if a foot stands from its first frame to the blend's end (the
-            paper's case 4), and would be farther than this from where it was before the jump [m].
+        local_maxima: Whether only the best of neighbouring jumps is kept: the third rule. None
+            does as the paper: the rule is used unless contact_change is set.
+        stutter_s: Jumps within a clip that skip or repeat less than this are dropped [s].
+        slip_m: A jump is dropped if a foot stands from its first frame to the end of the blend
+            (the paper's case 4) and would move farther than this [m].
         blend_s: Time over which a jump is blended [s]; 1 to 2 in the paper.
-        blend_rate_s: Time over which the difference in velocity at a jump goes, at most blend_s
-            [s]. The paper has one time for both; but a joint that is 3 rad/s faster when it is
-            left would go on to swing 25 degrees too far in a blend of 1 s, and a third of it in
-            0.3 s. The root takes twice this time.
-        block_m: Side of a block [m], of `Coordinates.BLOCKS`.
-        block_height_m: Its height [m].
+        blend_rate_s: Time over which the difference in velocity at a jump decays, at most blend_s
+            [s]. The paper has one time for both. But a joint that is 3 rad/s faster before the
+            jump would swing 25 degrees too far in a blend of 1 s, and a third of that in 0.3 s.
+            The root takes twice this time.
+        block_m: Side of a block of `Coordinates.BLOCKS` [m].
+        block_height_m: Height of a block [m].
     """
 
     fps: float = 15.0
@@ -128,10 +128,10 @@ class GraphConfig:
 
     @property
     def keeps_local_maxima(self) -> bool:
-        """Whether the third rule is in force."""
+        """Whether the third rule is used."""
         return not self.contact_change if self.local_maxima is None else self.local_maxima
 
     @property
     def max_distance(self) -> float:
-        """Largest distance of a jump that the second rule keeps."""
+        """Largest distance of a jump that passes the second rule."""
         return -self.sigma * math.log(self.least_probability)

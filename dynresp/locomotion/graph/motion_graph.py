@@ -1,8 +1,9 @@
-"""The lower layer: a Markov process over recorded frames (Lee et al. 2002, section 4.1).
+"""A motion graph: frames, and transitions between them (Lee et al. 2002, section 4.1).
 
-A state is a frame. From frame i the avatar goes on to the frame recorded after it, or jumps to a
-frame j whose predecessor j - 1 resembles i. Jumps are pruned by the paper's four rules, the last
-of which leaves one strongly connected component: a walk through the graph never comes to an end.
+The graph is the paper's lower layer, a Markov process whose states are frames. After frame i comes
+the frame recorded after it, or a jump to a frame j whose predecessor j - 1 resembles i. Jumps are
+pruned by the paper's four rules. The last rule keeps one strongly connected component, so a walk
+through the graph never ends.
 """
 
 from __future__ import annotations
@@ -29,16 +30,16 @@ from dynresp.support.errors import MotionError
 
 @dataclass(frozen=True)
 class PruningCounts:
-    """How many jumps each rule leaves, as in the paper's table 1.
+    """Numbers of jumps that each pruning rule leaves, as in the paper's table 1.
 
     Attributes:
         frames: Frames of the database.
         pairs: Pairs of frames considered.
         contact: Jumps left by the first rule, similar contacts.
-        likelihood: By the second, a probability above the threshold.
-        similarity: By the third, local maxima; None where it is not in force.
-        footing: By that of the feet: no foot would have to slip through a whole blend.
-        component: By the fourth, inside the largest strongly connected component.
+        likelihood: By the second rule, a probability above the threshold.
+        similarity: By the third rule, local maxima; None if the rule is not used.
+        footing: By the rule of `feet_stay_planted`.
+        component: By the fourth rule, inside the largest strongly connected component.
         component_frames: Frames of that component.
     """
 
@@ -54,20 +55,21 @@ class PruningCounts:
 
 @dataclass(frozen=True, eq=False)
 class MotionGraph:
-    """Frames, and the ways from each to the next. Arrays are read-only.
+    """Frames, and the transitions from each frame to the next ones. Arrays are read-only.
 
-    The ways lie in rows, one a frame: those of frame i are `offsets[i]` to `offsets[i + 1]`. A
-    row is empty where the frame is not in the component; otherwise its first way is the recorded
-    one, to frame i + 1, unless that is not in the component.
+    A transition is the recorded step to frame i + 1 or a jump. Jumps are sorted by their
+    source: those of frame i are `offsets[i]` to `offsets[i + 1]`. A frame outside the component
+    has none. The first transition of a frame is the recorded one, unless frame i + 1 is outside
+    the component.
 
     Attributes:
         database: The frames.
-        config: How it was made.
-        counts: What each pruning rule left.
-        offsets: (n + 1,) where the rows begin.
-        targets: (m,) the frame to which each way leads.
-        distances: (m,) distance between the frame left and the one before the target (eq. 2); 0
-            of a recorded way.
+        config: Settings by which it was built.
+        counts: Numbers of jumps that each pruning rule left.
+        offsets: (n + 1,) where the transitions of each frame begin.
+        targets: (m,) the frame to which each transition leads.
+        distances: (m,) distance between the source and the frame before the target (eq. 2); 0
+            for a recorded transition.
     """
 
     database: MotionDatabase
@@ -92,18 +94,18 @@ class MotionGraph:
         credit_lines: tuple[str, ...] = (),
         threads: int = 0,
     ) -> MotionGraph:
-        """Make a graph of motions.
+        """Build a graph from motions.
 
         Args:
             motions: At any frame rate.
             config: Settings.
-            character: Whose motions they are, by default the product's own.
+            character: The character of the motions, by default the product's own.
             contacts: See `MotionDatabase.from_motions`.
             credit_lines: `MotionDatabase.credits`.
             threads: Threads, 0 for all cores; the graph is the same bit for bit.
 
         Raises:
-            MotionError: There is no motion long enough, or no way is left.
+            MotionError: There is no motion long enough, or no transition is left.
         """
         config = config or GraphConfig()
         character = character or default_character()
@@ -120,18 +122,18 @@ class MotionGraph:
         character: Character | None = None,
         threads: int = 0,
     ) -> MotionGraph:
-        """Make a graph of a database that is at the configuration's frame rate already.
+        """Build a graph from a database that has the configuration's frame rate.
 
         Args:
             database: The frames.
             config: Settings.
-            character: Whose motions they are, by default the product's own.
+            character: The character of the motions, by default the product's own.
             threads: Threads, 0 for all cores; the graph is the same bit for bit.
 
         Raises:
-            MotionError: The frame rates differ, or no way is left.
+            MotionError: The frame rates differ, or no transition is left.
         """
-        from dynresp.locomotion.graph.pruning import find_transitions
+        from dynresp.locomotion.graph.pruning import find_jumps
 
         config = config or GraphConfig()
         if database.fps != config.fps:
@@ -139,7 +141,7 @@ class MotionGraph:
                 f"the database has {database.fps:g} fps and the configuration {config.fps:g}; "
                 "gather the motions at that rate"
             )
-        found = find_transitions(database, config, threads)
+        found = find_jumps(database, config, threads)
         sources, targets, distances = found.sources, found.targets, found.distances
         kept = feet_stay_planted(
             database, config, character or default_character(), sources, targets
@@ -151,7 +153,7 @@ class MotionGraph:
         sources, targets, distances = sources[kept], targets[kept], distances[kept]
         if not inside.any():
             raise MotionError(
-                "no way is left that could be walked for ever: no frame resembles another enough. "
+                "no endless walk is possible: no frame resembles another enough. "
                 "Give more motion, a larger sigma, or a smaller least_probability"
             )
         counts = PruningCounts(
@@ -164,20 +166,20 @@ class MotionGraph:
             component=len(sources),
             component_frames=int(np.count_nonzero(inside)),
         )
-        offsets, targets, distances = _rows(
+        offsets, targets, distances = _sorted_transitions(
             database.successors, inside, sources, targets, distances
         )
         return cls(database, config, counts, offsets, targets, distances)
 
     @functools.cached_property
     def sources(self) -> IntArray:
-        """(m,) the frame from which each way leads."""
+        """(m,) the frame from which each transition leads."""
         frames = np.arange(len(self.database), dtype=np.int32)
         return frozen(np.repeat(frames, np.diff(self.offsets)))
 
     @functools.cached_property
     def probabilities(self) -> FloatArray:
-        """(m,) of each way (eq. 1); a row adds up to 1."""
+        """(m,) probability of each transition (eq. 1); those of one frame add up to 1."""
         weights = np.exp(-self.distances.astype(np.float64) / self.config.sigma)
         lengths = np.diff(self.offsets)
         filled = np.flatnonzero(lengths)
@@ -186,7 +188,7 @@ class MotionGraph:
 
     @functools.cached_property
     def cumulative(self) -> FloatArray:
-        """(m,) sums of probabilities along each row; exactly 1 at a row's end."""
+        """(m,) cumulative probabilities of each frame's transitions; the last is exactly 1."""
         sums = np.cumsum(self.probabilities)
         before = np.concatenate([[0.0], sums])[self.offsets[self.sources]]
         along = np.minimum(sums - before, 1.0)
@@ -200,18 +202,19 @@ class MotionGraph:
 
     @functools.cached_property
     def placements(self) -> FloatArray:
-        """(m, 4) where the clip of a way's target is put, seen from the clip of its source."""
+        """(m, 4) placement of the target's clip relative to the source's clip, per transition."""
         return frozen(self.placements_between(self.sources, self.targets))
 
     def placements_between(self, sources: npt.ArrayLike, targets: npt.ArrayLike) -> FloatArray:
-        """Where the clip of a target is put, seen from the clip of the frame before it.
+        """Placements of the targets' clips relative to the sources' clips.
 
         Args:
-            sources: (k,) frames left.
-            targets: (k,) frames entered.
+            sources: (k,) frames that are left.
+            targets: (k,) frames that are entered.
 
         Returns:
-            (k, 4) placements; see `dynresp.locomotion.graph.placement`. Recorded ways have zeros.
+            (k, 4) placements; see `dynresp.locomotion.graph.placement`. Zero for recorded
+            transitions.
         """
         left, entered = np.asarray(sources), np.asarray(targets)
         out = np.zeros((len(left), 4))
@@ -226,12 +229,12 @@ class MotionGraph:
 
 
 def placements_between(left: FloatArray, matched: FloatArray, config: GraphConfig) -> FloatArray:
-    """Placements that lay frames over others as the coordinates allow.
+    """Placements that move frames onto others, as far as the coordinates allow.
 
     Args:
-        left: (k, 4) planar states that are left.
-        matched: (k, 4) planar states of the frames that are laid over them.
-        config: Says the coordinates.
+        left: (k, 4) planar states of the frames that are left.
+        matched: (k, 4) planar states of the frames that are moved onto them.
+        config: Gives the coordinates.
 
     Returns:
         (k, 4).
@@ -258,18 +261,17 @@ def feet_stay_planted(
     sources: IntArray,
     targets: IntArray,
 ) -> BoolArray:
-    """Which jumps ask no foot to slip through the whole blend, the paper's case 4 (section 4.1.1).
+    """Which jumps make no foot slip through the whole blend: the paper's case 4 (section 4.1.1).
 
-    A foot that is lifted during the blend is put where it belongs next; one that stands from the
-    jump to the blend's end, as before or just landed, has no time for that: it can only slip, or
-    stay where it should not.
+    A foot that is lifted during the blend is put down where it belongs. A foot that stands from the
+    jump to the end of the blend cannot be: it slips, or stays in the wrong position.
 
     Args:
         database: The frames.
-        config: Length of the blend, how far a foot may slip, and in what world it stands.
-        character: Whose feet.
-        sources: (m,) frames left.
-        targets: (m,) frames entered.
+        config: Length of the blend, how far a foot may slip, and the coordinates.
+        character: The character of the database.
+        sources: (m,) frames that are left.
+        targets: (m,) frames that are entered.
 
     Returns:
         (m,).
@@ -302,22 +304,22 @@ def _largest_component(successors: IntArray, sources: IntArray, targets: IntArra
     own = np.flatnonzero(successors >= 0)
     rows = np.concatenate([own, sources])
     columns = np.concatenate([successors[own], targets])
-    ways = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
-    _, labels = connected_components(ways, directed=True, connection="strong")
+    steps = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
+    _, labels = connected_components(steps, directed=True, connection="strong")
     sizes = np.bincount(labels)
-    # Of components of one size the one whose frames come first.
+    # Among components of equal size the one whose frames come first.
     largest = int(labels[np.argmax(sizes[labels] == sizes.max())])
     return (labels == largest) & (sizes.max() > 1)
 
 
-def _rows(
+def _sorted_transitions(
     successors: IntArray,
     inside: BoolArray,
     sources: IntArray,
     targets: IntArray,
     distances: npt.NDArray[np.float32],
 ) -> tuple[npt.NDArray[np.int64], IntArray, npt.NDArray[np.float32]]:
-    """Ways laid out in rows: offsets, targets and distances; the recorded way comes first."""
+    """Offsets, targets and distances of the transitions; a frame's recorded one comes first."""
     own = np.flatnonzero(inside & (successors >= 0) & inside[successors])
     all_sources = np.concatenate([own, sources])
     all_targets = np.concatenate([successors[own], targets])

@@ -1,8 +1,8 @@
-"""Where a clip is put in the world: turned about the vertical, then shifted.
+"""Placements: where a clip is put in the world, turned about the vertical, then shifted.
 
-A placement is a row (x, y, z, yaw) [m, m, m, rad]: it takes a point p of the clip's own world to
-R(yaw) p + (x, y, z). The planar state of a pose (its root's position and yaw) is one as well: the
-placement that takes a root at the origin facing +X there.
+A placement is a row (x, y, z, yaw) [m, m, m, rad]. It takes a point p of the clip's own world to
+R(yaw) p + (x, y, z). The planar state of a pose (its root's position and yaw) is a placement, too:
+the one that takes a root at the origin that faces +X to the root of the pose.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def of_poses(poses: FloatArray) -> FloatArray:
 def compose(outer: npt.ArrayLike, inner: npt.ArrayLike) -> FloatArray:
     """The placement `inner` followed by `outer`, (..., 4) each; shapes broadcast.
 
-    The yaw is brought into (-pi, pi].
+    The yaw is in (-pi, pi].
     """
     a, b = np.asarray(outer, dtype=np.float64), np.asarray(inner, dtype=np.float64)
     cosine, sine = np.cos(a[..., 3]), np.sin(a[..., 3])
@@ -51,7 +51,7 @@ def inverse(placement: npt.ArrayLike) -> FloatArray:
 
 
 def place_poses(poses: FloatArray, placements: npt.ArrayLike) -> FloatArray:
-    """Poses (n, 59), each in a placement of its own (n, 4), or all in one (4,)."""
+    """Poses (n, 59) put where placements say: one (4,) for all, or one for each (n, 4)."""
     at = np.broadcast_to(np.asarray(placements, dtype=np.float64), (len(poses), 4))
     turns = rotations.from_yaw(at[:, 3])
     placed = np.array(poses)
@@ -61,7 +61,7 @@ def place_poses(poses: FloatArray, placements: npt.ArrayLike) -> FloatArray:
 
 
 def place_velocities(velocities: FloatArray, placements: npt.ArrayLike) -> FloatArray:
-    """Rows of `qvel` (n, 45) of placed poses: the root's linear velocity turns with them."""
+    """Rows of `qvel` (n, 45) of placed poses: the root's linear velocity is turned."""
     at = np.broadcast_to(np.asarray(placements, dtype=np.float64), (len(velocities), 4))
     placed = np.array(velocities)
     placed[:, ROOT] = rotations.rotate(rotations.from_yaw(at[:, 3]), velocities[:, ROOT])

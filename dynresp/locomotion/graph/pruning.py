@@ -1,25 +1,24 @@
-"""Which jumps between frames are worth taking: three pruning rules (Lee et al. 2002, section 4.1).
+"""Find the jumps of a motion graph by three pruning rules (Lee et al. 2002, section 4.1).
 
-A jump from frame i to frame j is a pair of steps: the one recorded from i to i + 1, which it
-leaves, and the one from j - 1 to j, which it takes in its stead. All pairs of steps are considered.
+A jump from frame i to frame j replaces the recorded step from i to i + 1 by the recorded step from
+j - 1 to j. All pairs of steps are considered.
 
 1. Contact: i and j - 1 have the same contacts, and so have i + 1 and j. In the strict form a
-   contact moreover begins or ends from i to i + 1, and the same from j - 1 to j.
+   contact also begins or ends from i to i + 1, and the same one from j - 1 to j.
 2. Likelihood: exp(-D_i,j-1 / sigma) is not below `least_probability`.
 3. Similarity: D is the least among (i, j - 1) and its up to eight neighbours (i +- 1, j - 1 +- 1)
-   in the same clips that the first two rules have left. Of equal neighbours the one that comes
-   first, by the earlier frame and then the later, stays.
+   in the same clips that the first two rules have left. Among equal neighbours the first stays, in
+   the order of the earlier frame, then of the later.
 
-A clip's last frame makes no step and so has no jump: the first rule cannot be asked of it. Nothing
-is lost with it, since jumps lead from the frame before. Nor is it a jump where i and j - 1 lie in
-one clip less than `stutter_s` apart: that skips or repeats a moment. But such pairs and the
-recorded way itself, whose distance is zero, do take part in the third rule as neighbours; else the
-rim of the strip that they leave would be full of local maxima.
+A clip's last frame begins no step, so it has no jump; the frame before it can have the same jumps.
+Pairs with i and j - 1 in one clip and less than `stutter_s` apart are no jumps, since they skip or
+repeat a moment. But these pairs, and the recorded step itself, whose distance is zero, count as
+neighbours in the third rule; otherwise many pairs beside them would be local maxima.
 
-Distances and rules are the same from i to j - 1 as from j - 1 to i, so that every pair of steps is
-compared once and serves two jumps. The time grows with the square of the number of frames; memory
-grows with the number of frames and of jumps that are left. An index over the frames would gain
-little: of the pairs that rule 1 leaves many are close, and most of the time goes into those.
+Distances and rules are symmetric, so every pair of steps is compared once and gives two jumps. The
+time grows with the square of the number of frames, memory with the number of frames and of jumps
+that are left. An index over the frames would gain little: many of the pairs that rule 1 leaves are
+close, and most of the time goes into those.
 """
 
 from __future__ import annotations
@@ -41,29 +40,29 @@ from dynresp.support.arrays import IntArray
 _Single = npt.NDArray[np.float32]
 _Long = npt.NDArray[np.int64]
 
-# Pairs that a thread holds at most, for which it takes rows in smaller lots: 32 MiB.
+# Largest number of pairs that a thread holds, 32 MiB; it limits the rows of a lot.
 _PAIRS_AT_ONCE = 4_000_000
-_MOST_ROWS = 256
-# Frames of which the directions of the sketch are found.
+_MAX_ROWS = 256
+# Frames from which the directions of the bound vectors are computed.
 _SAMPLE = 2000
-# Frames that are sketched at once.
+# Frames that are projected at once.
 _BLOCK = 8192
-# Float32 may put the sketches of two frames a little farther apart than the frames are.
+# Rounding in float32 may make a bound a little larger than the distance.
 _SLACK, _FLOOR = 1.0001, 1e-5
 _UPPER = np.triu_indices(4)
 
 
 @dataclass(frozen=True, eq=False)
-class Transitions:
-    """Jumps that three rules have left, ordered by source, then by target.
+class Jumps:
+    """Jumps that three rules leave, sorted by source, then by target.
 
     Attributes:
         sources: (m,) frames i that are left.
         targets: (m,) frames j that are entered.
         distances: (m,) D_i,j-1.
         contact: Number of jumps left by the first rule.
-        likelihood: By the second.
-        similarity: By the third; None where it is not in force.
+        likelihood: By the second rule.
+        similarity: By the third rule; None if it is not used.
     """
 
     sources: IntArray
@@ -74,9 +73,7 @@ class Transitions:
     similarity: int | None
 
 
-def find_transitions(
-    database: MotionDatabase, config: GraphConfig, threads: int = 0
-) -> Transitions:
+def find_jumps(database: MotionDatabase, config: GraphConfig, threads: int = 0) -> Jumps:
     """Find the jumps of a database.
 
     Args:
@@ -100,7 +97,7 @@ def find_transitions(
     sources = np.concatenate([first, second])
     targets = np.concatenate([second, first]) + np.int32(1)
     order = np.argsort(sources.astype(np.int64) * len(database) + targets)
-    return Transitions(
+    return Jumps(
         sources=sources[order],
         targets=targets[order],
         distances=np.concatenate([distances, distances])[order],
@@ -112,7 +109,7 @@ def find_transitions(
 
 @dataclass(frozen=True, eq=False)
 class _Lot:
-    """Pairs first < second of some rows, and how many there were before the third rule."""
+    """Pairs first < second of some rows, and how many the second rule left."""
 
     first: IntArray
     second: IntArray
@@ -122,13 +119,13 @@ class _Lot:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """All that the rows of the matrix need; see `distance_kernel.close_pairs`."""
+    """Data for all rows of the matrix; see `frame_distance_kernel.close_pairs`."""
 
     clip_of: IntArray
     place_of: _Long
     group_stops: _Long
     frame_of: IntArray
-    sketch: _Single
+    bounds: _Single
     packed: _Single
     yaws: _Single
     turned: _Single
@@ -140,7 +137,7 @@ class _Search:
 
     @classmethod
     def of(cls, database: MotionDatabase, config: GraphConfig) -> _Search:
-        """Group the steps of a database by their contacts, and lay frames out for the kernel."""
+        """Group the steps of a database by their contacts, and arrange frames for the kernel."""
         features = frame_features(database.poses, database.velocities, config)
         stutter = stutter_frames(config)
         groups = step_groups(database.contact_states, database.successors, config.contact_change)
@@ -156,7 +153,7 @@ class _Search:
             place_of=place_of,
             group_stops=group_stops,
             frame_of=frame_of,
-            sketch=_sketch(features, frame_of),
+            bounds=_bound_vectors(features, frame_of),
             packed=packed,
             yaws=features.yaws[frame_of].astype(np.float32),
             turned=turned,
@@ -171,17 +168,17 @@ class _Search:
     def rows_at_once(self) -> int:
         """Rows of a lot."""
         longest = int(np.max(self.group_stops - self.place_of, initial=1))
-        return max(8, min(_MOST_ROWS, _PAIRS_AT_ONCE // longest))
+        return max(8, min(_MAX_ROWS, _PAIRS_AT_ONCE // longest))
 
     def jumps(self, rows: tuple[int, int]) -> _Lot:
         """Pairs of steps that the rules leave in some rows of the matrix."""
         from dynresp.locomotion.graph.frame_distance_kernel import close_pairs
         from dynresp.locomotion.graph.pruning_kernel import keep_best_of_neighbours
 
-        # One more row on both sides, where neighbours of the pairs are.
+        # One more row on both sides, which has neighbours of the pairs.
         first, stop = max(rows[0] - 1, 0), min(rows[1] + 1, len(self.clip_of))
         offsets, second, distances = close_pairs(
-            first, stop, self.place_of, self.group_stops, self.frame_of, self.sketch, self.packed,
+            first, stop, self.place_of, self.group_stops, self.frame_of, self.bounds, self.packed,
             self.yaws, self.turned, self.cell, self.max_distance * _SLACK + _FLOOR,
             self.max_distance,
         )  # fmt: skip
@@ -211,7 +208,7 @@ def step_groups(states: npt.NDArray[np.uint8], successors: IntArray, contact_cha
     Args:
         states: (n,) contacts of each frame.
         successors: (n,) the frame after each, -1 at the end of a clip.
-        contact_change: Whether the rule is taken in its strict form.
+        contact_change: Whether the rule has its strict form.
 
     Returns:
         (n,) group of the step from each frame, -1 where it has no jump.
@@ -227,9 +224,9 @@ def _count_pairs(groups: _Long, clip_of: IntArray, stutter: int) -> int:
     """Pairs i < j of steps of one group, without those that would stutter."""
     sizes = np.unique(groups[groups >= 0], return_counts=True)[1].tolist()
     total = sum(size * (size - 1) // 2 for size in sizes)
-    for apart in range(1, min(stutter, len(groups))):
-        same = (groups[apart:] == groups[:-apart]) & (clip_of[apart:] == clip_of[:-apart])
-        total -= int(np.count_nonzero(same & (groups[apart:] >= 0)))
+    for gap in range(1, min(stutter, len(groups))):
+        same = (groups[gap:] == groups[:-gap]) & (clip_of[gap:] == clip_of[:-gap])
+        total -= int(np.count_nonzero(same & (groups[gap:] >= 0)))
     return total
 
 
@@ -249,7 +246,7 @@ def _packed(features: FrameFeatures, frames: IntArray) -> tuple[_Single, _Single
         turned = np.concatenate(quarter_turned(features), axis=2)[frames].astype(np.float32)
     else:
         quaternions[:, :, joints] = features.orientations[frames]
-        # About their middle, where single precision is finest.
+        # Relative to their mean, where single precision is finest.
         positions = features.positions - np.mean(features.positions, axis=0)
         plain = [*plain, features.linear[frames], positions[frames]]
     numbers = np.concatenate(plain, axis=1)
@@ -257,31 +254,31 @@ def _packed(features: FrameFeatures, frames: IntArray) -> tuple[_Single, _Single
     return packed, turned
 
 
-def _sketch(features: FrameFeatures, frames: IntArray) -> _Single:
-    """`sketch` of the kernel: few numbers a frame, no farther apart than the frames are.
+def _bound_vectors(features: FrameFeatures, frames: IntArray) -> _Single:
+    """`bounds` of the kernel: few numbers a frame, no farther apart than the frames are.
 
-    Velocities and positions enter as they are, a rotation q by the matrix q q', which does not
-    know q from -q: |q q' - r r'|^2 / 2 is the squared sine of half the angle between q and r, so
-    never above half the angle squared. What is projected comes no farther apart, whatever the
-    directions; those in which a sample of the frames spreads most separate best.
+    Velocities and positions enter as they are, a rotation q by the matrix q q', which is the same
+    for q and -q: |q q' - r r'|^2 / 2 is the squared sine of half the angle between q and r, so
+    never above half the angle squared. A projection increases no distance, whatever the directions;
+    those in which a sample of the frames varies most give the best bounds.
     """
     from threadpoolctl import threadpool_limits
 
-    from dynresp.locomotion.graph.frame_distance_kernel import SKETCH
+    from dynresp.locomotion.graph.frame_distance_kernel import BOUND_SIZE
 
-    sketch = np.empty((SKETCH, len(frames)), dtype=np.float32)
+    bounds = np.empty((BOUND_SIZE, len(frames)), dtype=np.float32)
     if len(frames) == 0:
-        return sketch
+        return bounds
     rows = _embedded(features, frames[:: max(1, len(frames) // _SAMPLE)])
     middle = rows.mean(axis=0)
-    # The matrices are small: threads of BLAS would only wait for each other.
+    # The matrices are small: threads of BLAS would only slow this down.
     with threadpool_limits(limits=1, user_api="blas"):
         spread = ((rows - middle).T @ (rows - middle)).astype(np.float64)
-        directions = np.linalg.eigh(spread)[1][:, : -SKETCH - 1 : -1].astype(np.float32)
+        directions = np.linalg.eigh(spread)[1][:, : -BOUND_SIZE - 1 : -1].astype(np.float32)
         for start in range(0, len(frames), _BLOCK):
             block = slice(start, start + _BLOCK)
-            sketch[:, block] = ((_embedded(features, frames[block]) - middle) @ directions).T
-    return sketch
+            bounds[:, block] = ((_embedded(features, frames[block]) - middle) @ directions).T
+    return bounds
 
 
 def _embedded(features: FrameFeatures, frames: IntArray) -> _Single:
@@ -300,4 +297,4 @@ def _embedded(features: FrameFeatures, frames: IntArray) -> _Single:
     return rows.astype(np.float32)
 
 
-__all__ = ["Transitions", "find_transitions", "step_groups", "stutter_frames"]
+__all__ = ["Jumps", "find_jumps", "step_groups", "stutter_frames"]

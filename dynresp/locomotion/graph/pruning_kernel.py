@@ -1,4 +1,4 @@
-"""The compiled third pruning rule: local maxima of the transition matrix.
+"""Compiled loop of the third pruning rule: local maxima of the transition matrix.
 
 Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
 is used.
@@ -22,19 +22,19 @@ _SIGNATURE = types.void(
 
 @compiled(_SIGNATURE)
 def keep_best_of_neighbours(first, offsets, columns, distances, clip_of, keep):
-    """Mark the pairs that no neighbour in the matrix surpasses.
+    """Mark the pairs that have no better neighbour in the matrix.
 
-    Neighbours of (i, j) are the up to eight pairs (i', j') among those given with |i' - i| <= 1
-    and |j' - j| <= 1, frames of the same clips. A neighbour surpasses with a smaller distance, or
-    with the same distance and an earlier place (i', j') < (i, j).
+    Neighbours of (i, j) are the up to eight given pairs (i', j') with |i' - i| <= 1 and
+    |j' - j| <= 1 in the same clips. A neighbour is better if its distance is smaller, or equal and
+    (i', j') < (i, j).
 
     Args:
-        first: Frame of the first row.
-        offsets: (rows + 1,) where rows begin.
+        first: Frame i of the first row.
+        offsets: (rows + 1,) where each row's pairs begin.
         columns: (pairs,) frames j, ascending in a row.
-        distances: (pairs,).
+        distances: (pairs,) distance of each pair.
         clip_of: (n,) clip of each frame.
-        keep: (pairs,) out.
+        keep: Out, (pairs,) whether each pair has no better neighbour.
     """
     rows = len(offsets) - 1
     keep[:] = True

@@ -1,4 +1,4 @@
-"""Random walks through a graph: where it goes when nobody steers (eq. 1)."""
+"""Random walks through a motion graph, by its probabilities (eq. 1)."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from dynresp.support.errors import UsageError
 def random_walk(
     graph: MotionGraph, frames: int, rng: np.random.Generator, start: int | None = None
 ) -> IntArray:
-    """Walk on by the graph's probabilities.
+    """Draw a walk by the graph's probabilities.
 
     Args:
         graph: The graph.
-        frames: How many frames.
-        rng: Source of chance.
-        start: The frame before the first, in the graph's component; by default one at random.
+        frames: Number of frames.
+        rng: Random generator.
+        start: The frame before the first, in the graph's component. By default the walk begins
+            with a random frame.
 
     Returns:
-        (frames,) where `start` was not given, its first is the one at random; otherwise the first
-        is one that follows `start`.
+        (frames,) frames of the walk. `start` is not part of it.
 
     Raises:
-        UsageError: The start is not in the component, or there is no frame to walk.
+        UsageError: The start is not in the component, or `frames` is below 1.
     """
     from dynresp.locomotion.graph.random_walk_kernel import walk_kernel
 
@@ -41,10 +41,10 @@ def random_walk(
 
 
 def check_in_component(graph: MotionGraph, frame: int) -> None:
-    """Refuse a frame that no walk goes through.
+    """Check that walks can use a frame.
 
     Raises:
-        UsageError: It is none of the component's.
+        UsageError: It is not in the component.
     """
     if not 0 <= frame < len(graph.database) or graph.offsets[frame] == graph.offsets[frame + 1]:
         raise UsageError(

@@ -1,4 +1,4 @@
-"""The compiled inner loop of random walks.
+"""Compiled loop of random walks.
 
 Importing this module compiles it or loads it from numba's cache; import it where it is used.
 """
@@ -17,18 +17,18 @@ _SIGNATURE = types.void(_OFFSETS, _TARGETS, _FLOATS, _FLOATS, types.int32[::1])
 
 @compiled(_SIGNATURE)
 def walk_kernel(offsets, targets, cumulative, chances, path):
-    """Write a walk.
+    """Write a random walk.
 
     Args:
-        offsets: (n + 1,) where the rows of ways begin.
-        targets: (m,) where the ways lead.
-        cumulative: (m,) sums of probabilities along each row, the last of which is 1.
-        chances: (k,) numbers in [0, 1).
-        path: (k + 1,) its first frame is given; the others are written.
+        offsets: (n + 1,) where the transitions of each frame begin.
+        targets: (m,) the frame to which each transition leads.
+        cumulative: (m,) cumulative probabilities of each frame's transitions; the last is 1.
+        chances: (k,) random numbers in [0, 1).
+        path: In and out, (k + 1,). Its first frame is given; the others are written.
     """
     for k in range(len(chances)):
         low, high = offsets[path[k]], offsets[path[k] + 1] - 1
-        # The first way whose sum is above the number.
+        # The first transition whose cumulative probability is above the number.
         while low < high:
             middle = (low + high) // 2
             if chances[k] < cumulative[middle]:

@@ -31,12 +31,12 @@ class Watched:
         self.crowd = AvatarCrowd(character, library, graph, planners, starts, threads=threads)
         self.avatars = self.crowd.avatars
         self._shown = [np.stack([avatar.responder.pose for avatar in self.avatars])]
-        self._doing = [[avatar.activity for avatar in self.avatars]]
+        self._activities = [[avatar.activity for avatar in self.avatars]]
 
     def go_on(self, frames: int) -> None:
         for _ in range(frames):
             self._shown.append(self.crowd.advance())
-            self._doing.append([avatar.activity for avatar in self.avatars])
+            self._activities.append([avatar.activity for avatar in self.avatars])
 
     def until(self, phase: Phase, most: int = 120) -> None:
         for _ in range(most):
@@ -48,8 +48,8 @@ class Watched:
     def shown(self, i: int = 0) -> FloatArray:
         return np.stack([poses[i] for poses in self._shown])
 
-    def doing(self, i: int = 0) -> list[Activity]:
-        return [now[i] for now in self._doing]
+    def activity(self, i: int = 0) -> list[Activity]:
+        return [now[i] for now in self._activities]
 
 
 def root_steps(poses: FloatArray) -> FloatArray:

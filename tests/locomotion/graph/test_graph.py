@@ -11,7 +11,7 @@ from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.frame_distance import JOINT_WEIGHTS
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph, feet_stay_planted
-from dynresp.locomotion.graph.pruning import Transitions, find_transitions
+from dynresp.locomotion.graph.pruning import Jumps, find_jumps
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
@@ -87,7 +87,7 @@ def test_it_is_its_slow_twin(coordinates: Coordinates, contact_change: bool, see
     config = GraphConfig(
         coordinates=coordinates, contact_change=contact_change, sigma=0.4, **SLIPPING
     )
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     jumps = list(
         zip(*(x.tolist() for x in (found.sources, found.targets, found.distances)), strict=True)
     )
@@ -114,7 +114,7 @@ def test_feet_that_would_slip_through_a_blend(
         coordinates=coordinates, contact_change=False, local_maxima=False, sigma=1.0, slip_m=0.1,
         blend_s=0.5,
     )  # fmt: skip
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     kept = feet_stay_planted(database, config, character, found.sources, found.targets)
     expected = [
         oracle.feet_stay_planted(database, int(i), int(j), config, character)
@@ -141,10 +141,10 @@ def test_the_component_of_any_ways(monkeypatch: pytest.MonkeyPatch) -> None:
         }
         ways = np.array(sorted(pairs), dtype=np.int32).reshape(-1, 2)
         distances = rng.uniform(0.0, 0.1, len(ways)).astype(np.float32)
-        given_ways = Transitions(
+        given_ways = Jumps(
             ways[:, 0].copy(), ways[:, 1].copy(), distances, len(ways), len(ways), None
         )
-        monkeypatch.setattr(pruning, "find_transitions", lambda *_, found=given_ways: found)
+        monkeypatch.setattr(pruning, "find_jumps", lambda *_, found=given_ways: found)
         jumps = [(int(i), int(j), float(d)) for (i, j), d in zip(ways, distances, strict=True)]
         try:
             graph = MotionGraph.from_database(database, GraphConfig(**SLIPPING))

@@ -9,7 +9,7 @@ from dynresp.locomotion.graph import pruning
 from dynresp.locomotion.graph.frame_database import Clip, MotionDatabase
 from dynresp.locomotion.graph.frame_distance import JOINT_WEIGHTS, frame_distances, frame_features
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
-from dynresp.locomotion.graph.pruning import find_transitions, step_groups
+from dynresp.locomotion.graph.pruning import find_jumps, step_groups
 from tests.locomotion.graph.graph_samples import made_database, wandering_poses
 from tests.oracles import motion_graph as oracle
 
@@ -41,7 +41,7 @@ def test_it_finds_what_its_slow_twin_finds(coordinates, contact_change, local_ma
     distances = np.maximum(distances, distances.T)
     config = between_distances(distances, config, share)
     jumps, counts = oracle.transitions(distances, database.contacts, database.clip_of, config)
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     assert list(zip(found.sources, found.targets, strict=True)) == jumps
     expected = [found.contact, found.likelihood]
     expected += [found.similarity] if local_maxima else []
@@ -67,7 +67,7 @@ def test_of_equal_neighbours_the_first_stays():
     n = np.arange(24)
     distances = frame_distances(features, n[:, None], n[None, :])
     jumps, counts = oracle.transitions(distances, database.contacts, database.clip_of, config)
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     assert list(zip(found.sources, found.targets, strict=True)) == jumps
     assert [found.contact, found.likelihood, found.similarity] == counts
     # Along the twins' diagonal all distances are zero, and it makes one jump each way.
@@ -80,9 +80,9 @@ def test_of_equal_neighbours_the_first_stays():
 def test_threads_and_lots_change_no_bit(coordinates, contact_change, monkeypatch):
     database = made_database(np.random.default_rng(9), (400, 2, 350, 301), alike=0.1)
     config = GraphConfig(coordinates=coordinates, contact_change=contact_change, sigma=0.4)
-    found = [find_transitions(database, config, threads) for threads in (1, 2, 5)]
-    monkeypatch.setattr(pruning, "_MOST_ROWS", 37)
-    found.append(find_transitions(database, config, 3))
+    found = [find_jumps(database, config, threads) for threads in (1, 2, 5)]
+    monkeypatch.setattr(pruning, "_MAX_ROWS", 37)
+    found.append(find_jumps(database, config, 3))
     assert len(found[0].sources) > 50
     for other in found[1:]:
         for name in ("sources", "targets", "distances"):
@@ -98,7 +98,7 @@ def test_distances_are_those_of_the_reference(coordinates):
     poses = database.poses + np.r_[3000.0, -8000.0, 20.0, np.zeros(56)]
     database = replace(database, poses=poses)
     config = GraphConfig(coordinates=coordinates, contact_change=False, sigma=1.0)
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     features = frame_features(database.poses, database.velocities, config)
     expected = frame_distances(features, found.sources, found.targets - 1)
     np.testing.assert_allclose(found.distances, expected, rtol=2e-5, atol=2e-6)
@@ -113,7 +113,7 @@ def test_rotations_of_half_a_turn_are_found_whatever_the_sign():
     clips = tuple(Clip(str(k), 4 * k, 4 * k + 4, str(k)) for k in range(10))
     database = MotionDatabase(poses, np.ones((40, 2), bool), 15.0, clips, "")
     config = GraphConfig(contact_change=False, local_maxima=False, sigma=0.1, velocity_weight=0.0)
-    found = find_transitions(database, config)
+    found = find_jumps(database, config)
     # Three steps of ten clips, each with those of the other nine.
     assert found.likelihood == found.contact == len(found.sources) == 30 * 27
 
@@ -129,7 +129,7 @@ def test_the_contact_rule():
 
 def test_a_threshold_below_every_distance_leaves_nothing():
     database = made_database(np.random.default_rng(0), (30, 30))
-    found = find_transitions(database, GraphConfig(sigma=1e-9, contact_change=False))
+    found = find_jumps(database, GraphConfig(sigma=1e-9, contact_change=False))
     assert found.contact > 0
     assert (found.likelihood, found.similarity, len(found.sources)) == (0, 0, 0)
 
@@ -138,6 +138,6 @@ def test_without_a_contact_change_there_is_no_strict_jump():
     database = replace(
         made_database(np.random.default_rng(0), (30, 30)), contacts=np.ones((60, 2), bool)
     )
-    found = find_transitions(database, GraphConfig(sigma=10.0))
+    found = find_jumps(database, GraphConfig(sigma=10.0))
     assert (found.contact, found.likelihood, found.similarity) == (0, 0, None)
     assert len(found.sources) == 0
