@@ -5,7 +5,7 @@ member            dtype    shape            what it holds
 ================  =======  ===============  ====================================================
 ``format_version``  int64  ()               1
 ``character``     text     ()               `Character.identity` of the character that moves
-``identity``      text     ()               hash of frames, configuration and ways
+``identity``      text     ()               hash of frames, configuration and transitions
 ``config``        text     ()               the configuration, as JSON
 ``counts``        int64    (8,)             `PruningCounts` in its order; -1 for None
 ``poses``         float64  (frames, 59)     rows of `qpos`
@@ -13,15 +13,15 @@ member            dtype    shape            what it holds
 ``clip_names``    text     (clips,)         names of the motions
 ``clip_hashes``   text     (clips,)         identities of the motions (`motion_identity`)
 ``clip_stops``    int64    (clips,)         one past each clip's last frame
-``credits``       text     (credits,)       to whom the motions are owed
+``credits``       text     (credits,)       credits of the motions
 ``world``         text     ()               name of the world they were recorded in
-``offsets``       int64    (frames + 1,)    where the rows of ways begin
-``targets``       int32    (ways,)          where the ways lead
-``distances``     float32  (ways,)          their distances
+``offsets``       int64    (frames + 1,)    where each frame's transitions begin
+``targets``       int32    (transitions,)   the frames to which they lead
+``distances``     float32  (transitions,)   their distances
 ================  =======  ===============  ====================================================
 
-The poses are inside, so that a graph can be walked without the files it was made from.
-Probabilities follow from distances and are not kept.
+The file holds the poses, so a graph can be walked without the motion files. Probabilities follow
+from the distances and are not stored.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ FORMAT = ArchiveFormat(
         "credits": (TEXT, ("credits",)),
         "world": (TEXT, ()),
         "offsets": ("<i8", ("rows",)),
-        "targets": ("<i4", ("ways",)),
-        "distances": ("<f4", ("ways",)),
+        "targets": ("<i4", ("transitions",)),
+        "distances": ("<f4", ("transitions",)),
     },
     most={
         "frames": 250_000,
@@ -71,7 +71,7 @@ FORMAT = ArchiveFormat(
         "rows": 250_001,
         "clips": 20_000,
         "credits": 1_000,
-        "ways": 50_000_000,
+        "transitions": 50_000_000,
     },
     max_text=2_000,
     max_bytes=1 << 30,
@@ -81,10 +81,10 @@ FORMAT = ArchiveFormat(
 # As a motion must be; see `dynresp.motion.motion` and `dynresp.motion.readers.npz`.
 _FARTHEST_M = 100_000.0
 _UNIT_LENGTH_TOLERANCE = 1e-6
-# Of a way whose distance is more sigmas than this, no probability is left in a float64.
+# A transition whose distance has more sigmas than this has probability 0 in a float64.
 _MOST_SIGMAS = 700.0
 
-# What JSON has for the types of `GraphConfig`'s fields, and what it is called.
+# JSON types for the types of `GraphConfig`'s fields, and their names.
 _JSON_TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "float": ((float, int), "a number"),
     "bool": ((bool,), "true or false"),
@@ -98,26 +98,26 @@ def save_graph(graph: MotionGraph, path: str | Path) -> None:
 
     Args:
         graph: The graph.
-        path: The file, by custom ending in .npz; missing folders are made, an old file is replaced.
+        path: The file, usually *.npz; missing folders are made, an old file is replaced.
 
     Raises:
-        GraphFileError: The graph is larger than such a file may be.
+        GraphFileError: The graph is larger than a file may be.
         DynrespError: The file cannot be written.
     """
     FORMAT.write(path, {**_arrays(graph), "identity": text_array(graph_identity(graph))})
 
 
 def graph_identity(graph: MotionGraph) -> str:
-    """Short hash of a graph's frames, configuration and ways."""
+    """Short hash of a graph's frames, configuration and transitions."""
     return _hash(_arrays(graph))
 
 
 def load_graph(path: str | Path, character: Character | None = None) -> MotionGraph:
-    """Read a graph of this character.
+    """Read a graph.
 
     Args:
         path: The file.
-        character: The character that shall walk, by default the product's own.
+        character: The character that the graph must have, by default the product's own.
 
     Raises:
         GraphFileError: The file cannot be opened, is damaged or out of bounds, or belongs to
@@ -181,10 +181,10 @@ def _hash(arrays: Arrays) -> str:
 
 
 def _graph(arrays: Arrays) -> MotionGraph:
-    """The graph that the arrays tell of.
+    """The graph that the arrays of a file describe.
 
     Raises:
-        ValueError: They do not fit together.
+        ValueError: They contradict each other.
         DynrespError: They make no graph.
     """
     stops = arrays["clip_stops"].tolist()
@@ -213,18 +213,18 @@ def _graph(arrays: Arrays) -> MotionGraph:
     )
     offsets, targets, distances = (arrays[x] for x in ("offsets", "targets", "distances"))
     if len(offsets) != frames + 1 or offsets[0] != 0 or offsets[-1] != len(targets):
-        raise ValueError("the rows of ways do not fit the frames")
+        raise ValueError("the transitions do not match the frames")
     if (np.diff(offsets) < 0).any() or len(distances) != len(targets):
-        raise ValueError("the rows of ways do not fit together")
+        raise ValueError("the transitions do not match each other")
     if len(targets) and not (targets.min() >= 0 and targets.max() < frames):
-        raise ValueError("a way leads to a frame that is not there")
+        raise ValueError("a transition leads to a frame that does not exist")
     if not (np.isfinite(distances).all() and (distances >= 0).all()):
         raise ValueError("a distance is negative or not finite")
     if len(targets) == 0 or (np.diff(offsets)[targets] == 0).any():
-        raise ValueError("a way leads to a frame from which none leads on")
+        raise ValueError("a transition leads to a frame that has none")
     filled = np.flatnonzero(np.diff(offsets))
     if (np.minimum.reduceat(distances, offsets[filled]) > _MOST_SIGMAS * config.sigma).any():
-        raise ValueError("a frame has no way on that has a probability")
+        raise ValueError("a frame has no transition with a probability above 0")
     rows = np.repeat(np.arange(frames), np.diff(offsets))
     jumps = database.successors[rows] != targets
     first = np.zeros(frames, dtype=bool)
@@ -233,41 +233,42 @@ def _graph(arrays: Arrays) -> MotionGraph:
         raise ValueError("a jump leads to the first frame of a clip")
     considered, pairs, contact, likelihood, similarity, *rest = (int(x) for x in arrays["counts"])
     kept = None if similarity < 0 else similarity
-    told = PruningCounts(considered, pairs, contact, likelihood, kept, rest[0], rest[1], rest[2])
+    pruned = PruningCounts(considered, pairs, contact, likelihood, kept, rest[0], rest[1], rest[2])
     return MotionGraph(
-        database, config, told, offsets.astype(np.int64), targets.astype(np.int32),
+        database, config, pruned, offsets.astype(np.int64), targets.astype(np.int32),
         distances.astype(np.float32),
     )  # fmt: skip
 
 
 def _config(text: str) -> GraphConfig:
-    """The configuration, every key there and of its type.
+    """The configuration; every key must be there and have its type.
 
     Raises:
-        ValueError: It is no such table.
-        UsageError: A number makes no sense.
+        ValueError: A key is missing or has another type.
+        UsageError: A value is out of range.
     """
     try:
-        said = json.loads(text)
+        table = json.loads(text)
     except RecursionError:
         raise ValueError("the configuration is nested too deeply") from None
-    if not isinstance(said, dict):
-        raise ValueError("the configuration is no table")
+    if not isinstance(table, dict):
+        raise ValueError("the configuration is not a table")
     kinds = {field.name: _JSON_TYPES[str(field.type)] for field in dataclasses.fields(GraphConfig)}
-    if said.keys() != kinds.keys():
+    if table.keys() != kinds.keys():
         raise ValueError(f"the configuration must have the keys {', '.join(sorted(kinds))}")
     for name, (types, what) in kinds.items():
-        # Not isinstance: True is no number.
-        if type(said[name]) not in types:
-            raise ValueError(f"{name} must be {what}, not {type(said[name]).__name__}")
-    return GraphConfig(**{**said, "coordinates": Coordinates(said["coordinates"])})
+        # Not isinstance: True is not a number.
+        if type(table[name]) not in types:
+            raise ValueError(f"{name} must be {what}, not {type(table[name]).__name__}")
+    return GraphConfig(**{**table, "coordinates": Coordinates(table["coordinates"])})
 
 
 def _check_poses(poses: FloatArray) -> None:
-    """Refuse poses (frames, 59) that no body has.
+    """Check poses (frames, 59).
 
     Raises:
-        ValueError: A number is not finite, a root is far away, or a quaternion not of unit length.
+        ValueError: A number is not finite, a root is too far from the origin, or a quaternion is
+            not of unit length.
     """
     if not np.isfinite(poses).all():
         raise ValueError("a pose is not finite")

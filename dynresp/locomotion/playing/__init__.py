@@ -1,1 +1,1 @@
-"""Walks as motion: blended, brought to a frame rate, the feet fitted."""
+"""Walks through a graph as motion: blended, resampled, the feet fitted."""

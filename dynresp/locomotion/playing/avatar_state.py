@@ -1,4 +1,4 @@
-"""Where an avatar is in a graph and in the world: where searches for a way begin."""
+"""The state of an avatar: its frame in a graph and its placement in the world."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ from dynresp.support.errors import UsageError
 
 @dataclass(frozen=True, eq=False)
 class AvatarState:
-    """Where an avatar is.
+    """The frame and placement of an avatar, from which searches for a path start.
 
     Attributes:
-        frame: The frame it is at.
-        placement: (4,) where that frame's clip is put; see `dynresp.locomotion.graph.placement`.
-        displacement: (91,) what is left of blends: the displacement at the last jump (45), its
-            rate of change then (45) and the time since [s]; see `displacement_kernel`. None where
-            the frame was played as recorded.
+        frame: Its frame.
+        placement: (4,) of the frame's clip; see `dynresp.locomotion.graph.placement`.
+        displacement: (91,) what remains of blends; see `Playback.displacement`. None if the frame
+            was played as recorded.
     """
 
     frame: int
@@ -30,14 +29,14 @@ class AvatarState:
 
     @classmethod
     def at(cls, graph: MotionGraph, frame: int, x: float, y: float, yaw: float) -> AvatarState:
-        """The state in which a frame's root is somewhere.
+        """The state whose root has a given position and yaw.
 
         Args:
-            graph: Whose frame.
+            graph: The graph.
             frame: The frame.
-            x: Where its root is [m].
-            y: The same.
-            yaw: Where it faces [rad].
+            x: Position of its root [m].
+            y: Position of its root [m].
+            yaw: Yaw of its root [rad].
 
         Raises:
             UsageError: The graph has no such frame, or a number is not finite.

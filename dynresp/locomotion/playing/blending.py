@@ -1,9 +1,9 @@
-"""Frames of a graph played as one continuous motion: displacement mapping (section 4.1.1).
+"""Play frames of a graph as one continuous motion: displacement mapping (section 4.1.1).
 
 After a jump from frame i to frame j the recorded motion is displaced so that pose and velocity at
-frame j - 1 are those played at frame i; the displacement decays to nothing over the blend, and what
-the difference in velocity adds to it over a shorter time. The pose played at i holds what is left
-of earlier displacements, so blends may overlap.
+frame j - 1 are those played at frame i. The displacement decays to zero over the blend; the part
+that comes from the difference in velocity decays over a shorter time. The pose played at i includes
+what remains of earlier displacements, so blends may overlap.
 """
 
 from __future__ import annotations
@@ -22,16 +22,15 @@ from dynresp.support.errors import MotionError
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A stretch of played motion.
+    """A piece of played motion.
 
     Attributes:
         frames: (k,) the frames of the database.
         poses: (k, 59) as played, in the world.
         contacts: (k, 2 or 4) of the frames.
         jumps: (k,) whether a frame was reached by a jump.
-        placements: (k, 4) where the clip of each frame was put: its recorded pose, placed there, is
-            what was displaced.
-        velocities: (k, 45) how the poses move.
+        placements: (k, 4) of each frame's clip: the recorded pose, so placed, was displaced.
+        velocities: (k, 45) velocities of the poses.
     """
 
     frames: IntArray
@@ -43,25 +42,25 @@ class Played:
 
 
 class Playback:
-    """Plays frames of a graph one after the other; the next stretch goes on where the last ended.
+    """Plays frames of a graph; each call continues where the last one ended.
 
     Attributes:
-        graph: Whose frames.
+        graph: The graph.
         frame: The frame played last.
-        placement: (4,) where its clip is put.
+        placement: (4,) of its clip.
     """
 
-    def __init__(self, graph: MotionGraph, frame: int, place: npt.ArrayLike = IDENTITY) -> None:
-        """Begin after a frame that was played as it was recorded.
+    def __init__(self, graph: MotionGraph, frame: int, placement: npt.ArrayLike = IDENTITY) -> None:
+        """Start after a frame that was played as it was recorded.
 
         Args:
-            graph: Whose frames.
+            graph: The graph.
             frame: A frame of the graph's database.
-            place: (4,) where its clip is put.
+            placement: (4,) of its clip.
         """
         self.graph = graph
         self.frame = frame
-        self.placement = np.array(place, dtype=np.float64)
+        self.placement = np.array(placement, dtype=np.float64)
         self._offset, self._rate = np.zeros(45), np.zeros(45)
         self._age = np.array([graph.config.blend_s])
 
@@ -69,20 +68,20 @@ class Playback:
     def entering(
         cls, graph: MotionGraph, frame: int, pose: FloatArray, velocity: FloatArray
     ) -> Playback:
-        """Begin after any pose: the motion recorded after a frame is blended on to it.
+        """Start after any pose: the motion recorded after a frame is blended to it.
 
         Args:
-            graph: Whose frames.
-            frame: The frame that resembles the pose; the next one recorded is to be played.
-            pose: (59,) as played last, in the world.
-            velocity: (45,) how it moves.
+            graph: The graph.
+            frame: The frame that resembles the pose. The frame recorded after it is played next.
+            pose: (59,) the pose played last, in the world.
+            velocity: (45,) its velocity.
         """
         from dynresp.locomotion.playing.blending_kernel import displacement_kernel
 
         database = graph.database
         planar = of_poses(pose[None])
-        place = placements_between(planar, database.planar[frame : frame + 1], graph.config)[0]
-        playback = cls(graph, frame, place)
+        matched = database.planar[frame : frame + 1]
+        playback = cls(graph, frame, placements_between(planar, matched, graph.config)[0])
         displacement_kernel(
             np.ascontiguousarray(pose), np.ascontiguousarray(velocity), playback.placement,
             database.poses[frame], database.velocities[frame], playback._offset, playback._rate,
@@ -92,10 +91,10 @@ class Playback:
 
     @property
     def displacement(self) -> FloatArray:
-        """(91,) what is left of blends after the frame played last.
+        """(91,) what remains of blends after the frame played last.
 
-        The displacement at the last jump (45) [m, rad], its rate of change then (45) [1/s], and the
-        time since [s]; see `blending_kernel.displacement_kernel`.
+        The displacement at the last jump (45) [m, rad], its rate of change then (45) [m/s, rad/s],
+        and the time since [s]; see `blending_kernel.Blend`.
         """
         return np.concatenate([self._offset, self._rate, self._age])
 
@@ -103,13 +102,12 @@ class Playback:
         """Play the next frames.
 
         Args:
-            frames: (k,) the first follows the frame played last: the one recorded after it, or one
-                jumped to.
+            frames: (k,) frames; each is the one recorded after the frame before, or a jump.
 
         Raises:
-            MotionError: A jump leads to the first frame of a clip, before which none is recorded.
+            MotionError: A jump leads to the first frame of a clip, which has no frame before it.
         """
-        from dynresp.locomotion.playing.blending_kernel import play_kernel
+        from dynresp.locomotion.playing import blending_kernel as kernel
 
         database, config = self.graph.database, self.graph.config
         path = np.concatenate([[self.frame], np.asarray(frames)]).astype(np.int32)
@@ -120,54 +118,56 @@ class Playback:
             frame = int(entered[np.argmax(jumps & first)])
             raise MotionError(f"no jump can lead to frame {frame}, the first of its clip")
         moves = self.graph.placements_between(left, entered)
-        count = len(entered)
-        poses, placements = np.empty((count, 59)), np.empty((count, 4))
-        moving = np.empty((count, 45))
-        play_kernel(
-            database.poses, database.velocities, path, jumps, moves, database.fps, config.blend_s,
-            config.blend_rate_s,
-            self.placement, self._offset, self._rate, self._age, poses, placements,
-            moving,
-        )  # fmt: skip
+        rows = kernel.PlayedRows(*(np.empty((len(entered), size)) for size in (59, 4, 45)))
+        kernel.play_kernel(
+            kernel.Recording(database.poses, database.velocities),
+            kernel.Steps(path, jumps, moves),
+            kernel.BlendTimes(
+                float(database.fps), float(config.blend_s), float(config.blend_rate_s)
+            ),
+            kernel.Blend(self.placement, self._offset, self._rate, self._age),
+            rows,
+        )
         self.frame = int(path[-1])
-        return Played(entered, poses, database.contacts[entered], jumps, placements, moving)
+        contacts = database.contacts[entered]
+        return Played(entered, rows.poses, contacts, jumps, rows.placements, rows.velocities)
 
 
 @dataclass(frozen=True, eq=False)
-class KnotSteps:
-    """Steps from one pose to another that are as far apart in time as a graph's frames.
+class FrameSteps:
+    """Steps between consecutive frames of a graph, as pairs of poses and velocities.
 
     Attributes:
-        starts: (k, 59) where each step begins.
-        ends: (k, 59) where it ends.
-        moving_starts: (k, 45) how it moves at its beginning.
-        moving_ends: (k, 45) and at its end.
+        starts: (k, 59) pose at the start of each step.
+        ends: (k, 59) pose at its end.
+        start_velocities: (k, 45) velocity at the start.
+        end_velocities: (k, 45) velocity at the end.
     """
 
     starts: FloatArray
     ends: FloatArray
-    moving_starts: FloatArray
-    moving_ends: FloatArray
+    start_velocities: FloatArray
+    end_velocities: FloatArray
 
 
 def recorded_steps(
     graph: MotionGraph, before: int, played: Played, some: slice = slice(None)
-) -> KnotSteps:
-    """What was recorded of what was played: placed, nothing blended.
+) -> FrameSteps:
+    """The recorded steps of a played piece: placed, not blended.
 
-    A frame that was jumped to comes from the one recorded before it, which is laid over the frame
-    left.
+    The step to a frame reached by a jump begins at the frame recorded before it, moved onto the
+    frame that was left.
 
     Args:
-        graph: Whose frames.
+        graph: The graph.
         before: The frame played before the first of them.
-        played: What was played.
+        played: The piece.
         some: Which of its frames; by default all.
     """
     database, entered, places = graph.database, played.frames[some], played.placements[some]
     left = np.concatenate([[before], entered[:-1]])
     left = np.where(played.jumps[some], entered - 1, left)
-    return KnotSteps(
+    return FrameSteps(
         place_poses(database.poses[left], places),
         place_poses(database.poses[entered], places),
         place_velocities(database.velocities[left], places),

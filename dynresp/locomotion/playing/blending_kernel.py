@@ -1,4 +1,4 @@
-"""The compiled inner loop of playing a walk: placements, displacements, poses.
+"""Compiled loop of playing a walk: placements, displacements, poses.
 
 Importing this module compiles it or loads it from numba's cache; import it where it is used.
 """
@@ -6,6 +6,7 @@ Importing this module compiles it or loads it from numba's cache; import it wher
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -14,15 +15,79 @@ from dynresp.support.compiling import compiled
 
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
 _ROW = types.Array(types.float64, 1, "C", readonly=True)
-_FRAMES = types.Array(types.int32, 1, "C", readonly=True)
-_FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 _OUT = types.float64[:, ::1]
 _STATE = types.float64[::1]
+
+
+class Recording(NamedTuple):
+    """The frames of a database: poses (n, 59) and velocities (n, 45), rows of `qpos` and `qvel`."""
+
+    poses: Any
+    velocities: Any
+
+
+class Steps(NamedTuple):
+    """The frames to play.
+
+    Attributes:
+        frames: (k + 1,) the frame played before, then those to play.
+        jumps: (k,) whether each is reached by a jump.
+        moves: (k, 4) placement of each frame's clip relative to the clip before; read at jumps.
+    """
+
+    frames: Any
+    jumps: Any
+    moves: Any
+
+
+class BlendTimes(NamedTuple):
+    """Frame rate and times of blending.
+
+    Attributes:
+        fps: Frame rate [1/s].
+        blend_s: Time over which a displacement decays [s].
+        rate_s: Time over which the rate of joints decays, at most `blend_s`; the root takes twice
+            as long [s].
+    """
+
+    fps: float
+    blend_s: float
+    rate_s: float
+
+
+class Blend(NamedTuple):
+    """What remains of the last jump, after the frame played last.
+
+    Attributes:
+        placement: (4,) of the clip.
+        offset: (45,) displacement at the last jump: of the root [m], then rotation vectors of the
+            root and the joints in their own frames [rad].
+        rate: (45,) its rate of change at the last jump [m/s, rad/s].
+        age: (1,) time since the last jump [s].
+    """
+
+    placement: Any
+    offset: Any
+    rate: Any
+    age: Any
+
+
+class PlayedRows(NamedTuple):
+    """Arrays for what is played: poses (k, 59), placements (k, 4) and velocities (k, 45)."""
+
+    poses: Any
+    placements: Any
+    velocities: Any
+
+
 _DISPLACE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _STATE, _STATE)
 _PLAY = types.void(
-    _ROWS, _ROWS, _FRAMES, _FLAGS, _ROWS, types.float64, types.float64, types.float64,
-    _STATE, _STATE, _STATE, _STATE, _OUT, _OUT, _OUT,
-)  # fmt: skip
+    types.NamedUniTuple(_ROWS, 2, Recording),
+    types.NamedTuple((types.int32[::1], types.boolean[::1], _OUT), Steps),
+    types.NamedUniTuple(types.float64, 3, BlendTimes),
+    types.NamedUniTuple(_STATE, 4, Blend),
+    types.NamedUniTuple(_OUT, 3, PlayedRows),
+)
 
 
 @njit(inline="always")
@@ -68,7 +133,7 @@ def _turn_between(a, b, out):
 
 @njit(inline="always")
 def _move(place, dx, dy, dz, turn):
-    """A placement followed by one that is seen from it."""
+    """Move a placement (in place) by another, which is relative to it."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     place[0] += cosine * dx - sine * dy
     place[1] += sine * dx + cosine * dy
@@ -79,10 +144,10 @@ def _move(place, dx, dy, dz, turn):
 
 @njit
 def _decay(offset, rate, age, blend_s, rate_s):
-    """Bring a displacement and its rate to what they are at an age: cubics that end at rest.
+    """Decay a displacement and its rate (in place) to an age: cubics that end at rest.
 
-    The root takes twice as long as joints to change its speed: with as short a time it would jerk,
-    while joints would swing too far with a longer one.
+    The root takes twice as long as the joints to change its speed: in a shorter time it would jerk,
+    and in a longer one joints would swing too far.
     """
     s = min(age / blend_s, 1.0)
     from_offset = (2.0 * s - 3.0) * s * s + 1.0
@@ -116,7 +181,7 @@ def _put(pose, place, offset, out):
 def _jacobian(x, y, z, v, inverse, out):
     """The right Jacobian of rotations at a rotation vector o = (x, y, z), or its inverse, times v.
 
-    It takes the rate of change of o to the angular velocity of the rotation by o, in the turned
+    It maps the rate of change of o to the angular velocity of the rotation by o, in the turned
     frame: 1 - (1 - cos a) / a^2 [o] + (a - sin a) / a^3 [o]^2, where a = |o|.
     """
     square = x * x + y * y + z * z
@@ -140,7 +205,7 @@ def _jacobian(x, y, z, v, inverse, out):
 
 @njit
 def _turned_back(x, y, z, v, out):
-    """A vector v seen from a frame that is turned by a rotation vector (x, y, z)."""
+    """A vector v in the axes of a frame that is turned by a rotation vector (x, y, z)."""
     square = x * x + y * y + z * z
     angle = math.sqrt(square)
     if angle < 1e-3:
@@ -154,8 +219,8 @@ def _turned_back(x, y, z, v, out):
 
 
 @njit
-def _carry_on(velocity, place, offset, rate, out):
-    """How a recorded frame moves that is placed and displaced."""
+def _put_velocity(velocity, place, offset, rate, out):
+    """The velocity of a recorded frame, placed and displaced."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     out[0] = cosine * velocity[0] - sine * velocity[1] + rate[0]
     out[1] = sine * velocity[0] + cosine * velocity[1] + rate[1]
@@ -171,7 +236,7 @@ def _carry_on(velocity, place, offset, rate, out):
 
 @njit
 def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
-    """What to displace a placed frame by, for it to be a pose that moves with a velocity."""
+    """The displacement that turns a placed frame into a given pose with a given velocity."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
     offset[0] = pose[0] - (place[0] + cosine * recorded[0] - sine * recorded[1])
     offset[1] = pose[1] - (place[1] + sine * recorded[0] + cosine * recorded[1])
@@ -196,67 +261,56 @@ def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
 
 @compiled(_DISPLACE)
 def displacement_kernel(pose, velocity, place, recorded, its_velocity, offset, rate):
-    """Write what a placed frame is displaced by for it to be a pose that moves with a velocity.
+    """Write the displacement that turns a placed frame into a given pose with a given velocity.
 
     Args:
         pose: (59,) the pose.
-        velocity: (45,) how it moves.
-        place: (4,) where the frame is put.
-        recorded: (59,) the frame.
-        its_velocity: (45,) how that moves, in its own world.
-        offset: Out, (45,) displacement of the root [m], then rotation vectors of the root and the
-            joints in their own frames [rad].
-        rate: Out, (45,) its rate of change [1/s].
+        velocity: (45,) its velocity.
+        place: (4,) placement of the frame.
+        recorded: (59,) the frame, in its own world.
+        its_velocity: (45,) velocity of the frame, in its own world.
+        offset: Out, (45,) see `Blend`.
+        rate: Out, (45,) see `Blend`.
     """
     _displace(pose, velocity, place, recorded, its_velocity, offset, rate)
 
 
 @compiled(_PLAY)
-def play_kernel(
-    poses, velocities, frames, jumps, moves, fps, blend_s, rate_s,
-    place, offset, rate, age, played, placements, moving,
-):  # fmt: skip
-    """Write the poses of a walk; the state goes on from one call to the next.
+def play_kernel(recording, steps, times, blend, played):
+    """Play frames of a walk.
 
     Args:
-        poses: (n, 59) of the database.
-        velocities: (n, 45) of the database.
-        frames: (k + 1,) the frame played before, then those to play.
-        jumps: (k,) whether each is reached by a jump.
-        moves: (k, 4) where the clip of each is put, seen from the clip before; read at jumps.
-        fps: Frame rate.
-        blend_s: Time over which a displacement decays [s].
-        rate_s: Time over which the rate of joints does, at most as long; the root's takes twice it.
-        place: In and out, (4,) where the clip is put.
-        offset: In and out, (45,) displacement at the last jump; see `displacement_kernel`.
-        rate: In and out, (45,) its rate of change then.
-        age: In and out, (1,) time since then [s].
-        played: Out, (k, 59).
-        placements: Out, (k, 4) where the clip of each frame was put.
-        moving: Out, (k, 45) how each pose moves.
+        recording: The `Recording`.
+        steps: The `Steps`.
+        times: The `BlendTimes`.
+        blend: In and out, the `Blend`; the next call continues from it.
+        played: Out, the `PlayedRows`.
     """
+    poses, velocities = recording
+    frames, jumps, moves = steps
+    place, offset, rate, age = blend
     pose, velocity = np.empty(59), np.empty(45)
     now, its_rate = np.empty(45), np.empty(45)
     for k in range(len(jumps)):
         frame = frames[k + 1]
         if jumps[k]:
-            # The pose and velocity at the frame left as they were played: what is still displaced
-            # there counts, so that blends overlap.
+            # Pose and velocity as played at the frame left, with what remains of earlier
+            # displacements: so blends overlap.
             left = frames[k]
             now[:], its_rate[:] = offset, rate
-            _decay(now, its_rate, age[0], blend_s, rate_s)
+            _decay(now, its_rate, age[0], times.blend_s, times.rate_s)
             _put(poses[left], place, now, pose)
-            _carry_on(velocities[left], place, now, its_rate, velocity)
+            _put_velocity(velocities[left], place, now, its_rate, velocity)
             _move(place, moves[k, 0], moves[k, 1], moves[k, 2], moves[k, 3])
             _displace(pose, velocity, place, poses[frame - 1], velocities[frame - 1], offset, rate)
             age[0] = 0.0
-        age[0] += 1.0 / fps
-        if age[0] < blend_s:
+        age[0] += 1.0 / times.fps
+        if age[0] < times.blend_s:
             now[:], its_rate[:] = offset, rate
-            _decay(now, its_rate, age[0], blend_s, rate_s)
+            _decay(now, its_rate, age[0], times.blend_s, times.rate_s)
         else:
             now[:], its_rate[:] = 0.0, 0.0
-        _put(poses[frame], place, now, played[k])
-        _carry_on(velocities[frame], place, now, its_rate, moving[k])
+        _put(poses[frame], place, now, played.poses[k])
+        _put_velocity(velocities[frame], place, now, its_rate, played.velocities[k])
         for i in range(4):
-            placements[k, i] = place[i]
+            played.placements[k, i] = place[i]

@@ -1,4 +1,4 @@
-"""From frames of a graph to a motion: played, brought to a frame rate, its feet fitted."""
+"""Compose a motion from frames of a graph: played, resampled, its feet fitted."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import IDENTITY
-from dynresp.locomotion.playing.blending import KnotSteps, Playback, recorded_steps
+from dynresp.locomotion.playing.blending import FrameSteps, Playback, recorded_steps
 from dynresp.locomotion.playing.stance_steps import keep_feet_planted
 from dynresp.motion.character import POSE_SIZE, Character
 from dynresp.motion.feet.foot_fitting import MAX_ROOT_DROP, ComposedMotion, fit_feet
@@ -20,12 +20,12 @@ from dynresp.support.arrays import BoolArray, IntArray
 from dynresp.support.errors import MotionError
 
 MAX_FRAMES = 500_000
-"""So many frames are composed at once: an hour at 120 a second takes 432,000. The motion is held in
-memory about eight times over meanwhile (measured), in 2 GB at most."""
+"""Largest number of frames of a composed motion; an hour at 120 fps has 432,000. Composing takes
+about eight times the memory of the motion (measured), at most 2 GB."""
 
-# A frame so near to a knot is on it, as part of the way between two.
+# A frame this close to a frame of the graph is on it, as part of a step.
 _ON = 1e-6
-# About so many frames are brought to a frame rate at a time, which saves memory.
+# About this many frames are resampled at a time, to save memory.
 _BLOCK = 4096
 
 
@@ -35,9 +35,9 @@ class Composition:
 
     Attributes:
         frames: (k,) the frames of the graph.
-        motion: What is played; frame f of the walk is due at f / graph fps.
-        jumps: Frames of the walk, from 1, that are reached by a jump.
-        placements: (k, 4) where the clip of each frame was put.
+        motion: The motion; frame f of the walk is at time f / graph fps.
+        jumps: Indices into the walk, from 1, of frames that are reached by a jump.
+        placements: (k, 4) of each frame's clip.
         unfitted: (n, 59) the motion before its feet were fitted.
     """
 
@@ -57,13 +57,13 @@ def compose(
     ground: FloatArray | None = None,
     max_root_drop: float = MAX_ROOT_DROP,
 ) -> Composition:
-    """Play a walk from its first frame on.
+    """Compose the motion of a walk.
 
     Args:
-        graph: Whose frames.
+        graph: The graph.
         character: The character.
         frames: (k,) a walk; two frames or more.
-        place: (4,) where the clip of the first frame is put.
+        place: (4,) placement of the first frame's clip.
         fps: Frame rate of the motion, by default the graph's.
         ground: (n, 2) height of the ground under each foot [m], by default 0.
         max_root_drop: How far the root is lowered at most for legs that are too short [m].
@@ -77,15 +77,15 @@ def compose(
     if len(step) > MAX_FRAMES:
         raise MotionError(
             f"a walk of {len(path) / graph.config.fps:.0f} s at {fps:g} fps has {len(step):,} "
-            f"frames, and at most {MAX_FRAMES:,} are held in memory at once; ask for a shorter "
-            "one or for fewer frames a second"
+            f"frames, and at most {MAX_FRAMES:,} are possible; ask for a shorter walk or a lower "
+            "frame rate"
         )
     playback = Playback(graph, int(path[0]), place)
     start = np.array(place, dtype=np.float64)
     played = playback.play(path[1:])
     database = graph.database
     first = placement.place_poses(database.poses[path[:1]], start)
-    knots = np.concatenate([first, played.poses])
+    keyframes = np.concatenate([first, played.poses])
     moving = placement.place_velocities(database.velocities[path[:1]], start)
     moving = np.concatenate([moving, played.velocities])
     contacts = standing_between(database.contacts[path, :2], step, part)
@@ -95,18 +95,18 @@ def compose(
         some = slice(begin, min(begin + block, len(path) - 1))
         rows = slice(*np.searchsorted(step, [some.start, some.stop]))
         steps = recorded_steps(graph, int(path[begin]), played, some)
-        way = StepTimes(step[rows] - begin, part[rows], 1.0 / graph.config.fps, contacts[rows])
+        times = StepTimes(step[rows] - begin, part[rows], 1.0 / graph.config.fps, contacts[rows])
         after = slice(some.start + 1, some.stop + 1)
-        ours = KnotSteps(knots[some], knots[after], moving[some], moving[after])
-        poses[rows], source[rows] = (interpolate_steps(character, x, way) for x in (ours, steps))
+        ours = FrameSteps(keyframes[some], keyframes[after], moving[some], moving[after])
+        poses[rows], source[rows] = (interpolate_steps(character, x, times) for x in (ours, steps))
     jumps = np.flatnonzero(played.jumps) + 1
-    # The first frame of the motion after the frame left.
+    # The first frame of the motion after each frame that was left.
     entered = np.unique(np.searchsorted(step, jumps - 1))
     blend_s = graph.config.blend_s
     composed = ComposedMotion(poses, source, contacts, entered, fps, blend_s, poses[:1], ground)
     fitted = fit_feet(character, composed, max_root_drop)
-    # Memory that the motion needs to be made.
-    del composed, source, knots, moving
+    # Free memory for the motion.
+    del composed, source, keyframes, moving
     return Composition(
         frames=path,
         motion=Motion(fitted, fps, "walk by graph", contacts),
@@ -118,13 +118,13 @@ def compose(
 
 @dataclass(frozen=True, eq=False)
 class StepTimes:
-    """Where frames lie among the steps from knot to knot.
+    """Times of a motion's frames within the steps between frames of a graph.
 
     Attributes:
-        step: (n,) see `steps_at_rate`.
-        part: (n,) see `steps_at_rate`.
-        seconds: How long a step takes [s].
-        stands: (n, 2) see `standing_between`.
+        step: (n,) the step of each frame; see `steps_at_rate`.
+        part: (n,) its part of that step that has passed; see `steps_at_rate`.
+        seconds: Duration of a step [s].
+        stands: (n, 2) which feet stand; see `standing_between`.
     """
 
     step: npt.NDArray[np.intp]
@@ -133,27 +133,31 @@ class StepTimes:
     stands: BoolArray
 
 
-def interpolate_steps(character: Character, steps: KnotSteps, way: StepTimes) -> FloatArray:
-    """Poses (n, 59) among knots, whose feet do not leave them where they stand."""
-    at = way.step
+def interpolate_steps(character: Character, steps: FrameSteps, times: StepTimes) -> FloatArray:
+    """Interpolate poses (n, 59) within steps; planted feet stay."""
+    at = times.step
     poses = interpolate_with_velocities(
-        steps.starts[at], steps.ends[at], steps.moving_starts[at], steps.moving_ends[at], way.part,
-        way.seconds,
-    )  # fmt: skip
+        steps.starts[at],
+        steps.ends[at],
+        steps.start_velocities[at],
+        steps.end_velocities[at],
+        times.part,
+        times.seconds,
+    )
     ends = steps.starts, steps.ends
-    return keep_feet_planted(character, poses, ends, at, way.part, way.stands)
+    return keep_feet_planted(character, poses, ends, at, times.part, times.stands)
 
 
 def standing_between(
     contacts: BoolArray, step: npt.NDArray[np.intp], part: FloatArray
 ) -> BoolArray:
-    """Which feet stand in frames among knots: between two knots those that stand at both.
+    """Which feet stand within steps: those that stand at both ends.
 
-    A foot that comes down, or is lifted, moves fast until the knot at which it stands, or from it
-    on; were it held before, it would be held in the wrong place.
+    A foot that comes down moves fast until the end of the step, and one that is lifted from its
+    start on; held during the step, it would be held in the wrong position.
 
     Args:
-        contacts: (k, 2) at the knots.
+        contacts: (k, 2) at the frames of the graph.
         step: (n,) see `steps_at_rate`.
         part: (n,) see `steps_at_rate`.
 
@@ -166,16 +170,16 @@ def standing_between(
 
 
 def steps_at_rate(count: int, rate: float, fps: float) -> tuple[npt.NDArray[np.intp], FloatArray]:
-    """Where the frames of a motion at another rate lie among knots.
+    """Steps in which the frames of a motion at another frame rate are.
 
     Args:
-        count: How many knots, two or more.
-        rate: Knots a second.
-        fps: Frames a second.
+        count: Number of frames of the graph, two or more.
+        rate: Their frame rate [1/s].
+        fps: Frame rate of the motion [1/s].
 
     Returns:
-        (n,) the knot before each frame, and (n,) how far it is on the way to the next, in (0, 1];
-        a frame on a knot belongs to the way that leads there, but for the first of all.
+        (n,) index of each frame's step, and (n,) the part of the step that has passed, in (0, 1].
+        A frame at the end of a step belongs to that step. Only the first frame has part 0.
     """
     frames = int(np.floor((count - 1) * fps / rate + 1e-9)) + 1
     at = np.arange(frames) * rate / fps

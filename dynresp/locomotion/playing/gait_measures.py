@@ -1,13 +1,13 @@
-"""How a motion walks, in numbers that tell one walk from another (Lee et al. 2002, figure 9).
+"""Measure gait: stances, step lengths, widths and times (Lee et al. 2002, figure 9).
 
-Stances are found anew in every motion, by the heights and speeds of its soles, so that a recording
-and a walk through a graph are measured alike.
+Stances are detected in every motion from the heights and speeds of its soles, so a recording and a
+walk through a graph are measured alike.
 
-A step is told by three stances that follow each other, one foot's, the other's and the first's
-again. The line from the first to the third is the stride. The step's width is how far the other
-foot stands to the side of that line, its length how far the third stance lies ahead of the second
-along it, and its time what passes between their beginnings. Steps to the side have no length and
-width in this sense, and turning on the spot makes no stride; neither is counted.
+A step is defined by three consecutive stances: one foot's, the other's and the first's again. The
+line from the first to the third is the stride. The step's width is the distance of the second
+stance from that line, its length how far the third stance is ahead of the second along the line,
+and its time the time between their starts. Steps to the side and turning on the spot are not
+counted.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
 from dynresp.support.runs import runs
 
-# A foot that comes down again nearer to where it stood has not been moved [m].
+# A foot that comes down closer than this to its last stance has not moved [m].
 _MOVED_M = 0.05
-# A shorter stride is no walking [m].
+# Shorter strides are not counted as walking [m].
 _STRIDE_M = 0.2
-# Farther from where one faces, or its opposite, a stride leads to the side.
-_ASIDE = np.cos(np.radians(45.0))
+# Strides at larger angles to the facing direction, or its opposite, are steps to the side.
+_MIN_COSINE = np.cos(np.radians(45.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Gait:
-    """The stances of a motion, in the order of their beginnings, and its steps.
+    """The stances of a motion, sorted by their starts, and its steps.
 
     Attributes:
         feet: (k,) 0 for the left foot, 1 for the right one.
-        places: (k, 2) where the middle of the sole stands [m].
-        yaws: (k,) where the foot points [rad].
-        begins_s: (k,) when each begins [s].
+        places: (k, 2) position of the middle of the sole [m].
+        yaws: (k,) yaw of the foot [rad].
+        begins_s: (k,) start of each stance [s].
         lengths: (m,) of the steps [m].
         widths: (m,) of the steps [m]; negative where the feet cross.
         times: (m,) of the steps [s].
@@ -65,8 +65,8 @@ def measure_gait(motion: Motion, character: Character) -> Gait:
     """Measure how a motion walks on level ground.
 
     Args:
-        motion: The motion; 30 frames a second or more tell the time of a step well enough.
-        character: Whose motion it is.
+        motion: The motion; use 30 fps or more for exact step times.
+        character: The character of the motion.
     """
     states = character.kinematics(motion.poses)
     contacts = foot_contacts(character, states, motion.fps)
@@ -99,7 +99,7 @@ def _steps(
         feet: (k,).
         places: (k, 2).
         begins: (k,).
-        facing: (k,) yaw of the root when each begins [rad].
+        facing: (k,) yaw of the root at the start of each stance [rad].
     """
     found = []
     for k in range(1, len(feet) - 1):
@@ -112,10 +112,10 @@ def _steps(
             continue
         along = stride / length
         ahead = float(along @ (np.cos(facing[k]), np.sin(facing[k])))
-        if abs(ahead) < _ASIDE:
+        if abs(ahead) < _MIN_COSINE:
             continue
         other = places[k] - places[k - 1]
-        # To the left of where one faces, also when walking backward.
+        # To the left of the facing direction, also when walking backward.
         left = float(along[0] * other[1] - along[1] * other[0]) * np.sign(ahead)
         side = 1.0 if feet[k] == 0 else -1.0
         found.append((length - float(other @ along), side * left, begins[k + 1] - begins[k]))
@@ -124,14 +124,14 @@ def _steps(
 
 
 def ground_speeds(motion: Motion, over_s: float = 1.0) -> FloatArray:
-    """How fast the root goes over the ground, frame by frame.
+    """Speed of the root over the ground, frame by frame.
 
-    A walking root sways and surges with every step: the way is that between two places `over_s`
-    apart, about one cycle of a walk, less at the ends of the motion.
+    The root sways with every step, so the speed is the distance between two positions `over_s`
+    apart, about one cycle of a walk, divided by the time; less time at the ends of the motion.
 
     Args:
-        motion: The motion, of two frames at least.
-        over_s: Time between the places [s].
+        motion: The motion, of at least two frames.
+        over_s: Time between the positions [s].
 
     Returns:
         (frames,) [m/s].
@@ -147,5 +147,5 @@ def ground_speeds(motion: Motion, over_s: float = 1.0) -> FloatArray:
     half = max(1, round(0.5 * over_s * motion.fps))
     frames = np.arange(len(track))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(track) - 1)
-    ways: FloatArray = np.linalg.norm(track[after] - track[before], axis=1)
-    return ways * motion.fps / (after - before)
+    distances: FloatArray = np.linalg.norm(track[after] - track[before], axis=1)
+    return distances * motion.fps / (after - before)

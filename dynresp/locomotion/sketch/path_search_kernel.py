@@ -17,7 +17,14 @@ import math
 import numpy as np
 from numba import njit, types
 
-from dynresp.locomotion.playing.blending_kernel import play_kernel
+from dynresp.locomotion.playing.blending_kernel import (
+    Blend,
+    BlendTimes,
+    PlayedRows,
+    Recording,
+    Steps,
+    play_kernel,
+)
 from dynresp.locomotion.sketch.path_search_heap_kernel import number, sift_down, sift_up, slot_of
 from dynresp.locomotion.worlds.collision_kernel import (
     FOOTPRINTS,
@@ -133,12 +140,14 @@ def _plays_free(left, entry, stop, move, motion, playing, body, grid, settings):
         frames[k + 1] = entry + k
     jumps[0] = entry != left + 1
     moves[0] = move
-    played, placements = np.empty((count, 59)), np.empty((count, 4))
+    played = np.empty((count, 59))
     play_kernel(
-        poses, velocities, frames, jumps, moves, 1.0 / settings[FRAME_TIME], settings[BLEND],
-        settings[BLEND_RATE], playing[PLACE:OFFSET], playing[OFFSET:RATE], playing[RATE:AGE],
-        playing[AGE:PLAYED], played, placements, np.empty((count, 45)),
-    )  # fmt: skip
+        Recording(poses, velocities),
+        Steps(frames, jumps, moves),
+        BlendTimes(1.0 / settings[FRAME_TIME], settings[BLEND], settings[BLEND_RATE]),
+        Blend(playing[PLACE:OFFSET], playing[OFFSET:RATE], playing[RATE:AGE], playing[AGE:PLAYED]),
+        PlayedRows(played, np.empty((count, 4)), np.empty((count, 45))),
+    )
     states = (1, len(body[0]))
     positions, centers = np.empty((*states, 3)), np.empty((*states, 3))
     quaternions, nowhere = np.empty((*states, 4)), np.zeros((len(body[0]), 3))

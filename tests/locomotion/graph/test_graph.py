@@ -38,7 +38,7 @@ def check_rows(graph: MotionGraph) -> None:
     assert len(graph.distances) == len(graph.probabilities) == len(graph.targets)
     inside = np.diff(offsets) > 0
     np.testing.assert_array_equal(graph.frames, np.flatnonzero(inside))
-    # No dead end: from wherever a way leads, another leads on.
+    # No dead end: every target has a transition.
     assert inside[graph.targets].all()
     jumps = is_jump(graph)
     own = graph.database.successors
