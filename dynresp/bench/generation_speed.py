@@ -12,7 +12,7 @@ from dynresp.bench.measure import BenchResult
 from dynresp.experiments.experiment_reader import read_experiment
 from dynresp.experiments.runner import prepare_run
 from dynresp.response.responder import Responder
-from dynresp.response.search.hit_labels import OUTCOMES, Labeller
+from dynresp.response.search.hit_labels import OUTCOMES, HitLabeller
 from dynresp.support.errors import DynrespError
 from dynresp.support.paths import example_specs
 
@@ -46,7 +46,7 @@ def run(
         experiment, example_specs("experiments"), motions, seed, 1, {"budget": "best"}
     )
     hits = [(loaded.base.motion, hit.impact) for hit in loaded.hits(range(samples))]
-    labeller = Labeller(loaded.character, loaded.library, loaded.config, threads=1)
+    labeller = HitLabeller(loaded.character, loaded.library, loaded.config, threads=1)
     responder = Responder(loaded.character, loaded.library, loaded.config, threads=1)
     # Kernels and scenes are compiled once.
     labeller.label(hits[:2])

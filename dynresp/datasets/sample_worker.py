@@ -60,7 +60,7 @@ class SampleWorker:
             SpecError: A base motion is too short, or the settings do not fit the library.
             DynrespError: A motion or a library cannot be read.
         """
-        from dynresp.response.search.hit_labels import OUTCOMES, Labeller
+        from dynresp.response.search.hit_labels import OUTCOMES, HitLabeller
 
         self.spec = spec
         self._character = default_character()
@@ -86,7 +86,7 @@ class SampleWorker:
         )
         self._outcomes = OUTCOMES
         try:
-            self._labeller = Labeller(self._character, self._library, self._config, threads=1)
+            self._labeller = HitLabeller(self._character, self._library, self._config, threads=1)
         except MotionError as error:
             # A clip of the library that is shorter than a window.
             raise SpecError(f"settings.window_s: {error}") from None

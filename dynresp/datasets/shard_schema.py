@@ -17,7 +17,7 @@ from dynresp.support.extras import require
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from dynresp.response.search.hit_labels import Labelled
+    from dynresp.response.search.hit_labels import HitLabels
 
 SCHEMA_VERSION = 1
 """Increases with every change of the columns or of their meaning."""
@@ -122,7 +122,7 @@ def drawn(samples: Sequence[Sample], character: Character) -> Columns:
     return found
 
 
-def labelled(result: Labelled) -> Columns:
+def labelled(result: HitLabels) -> Columns:
     """Columns of what the hits did."""
     names = (
         "outcome", "contact_time_s", "contact_frame", "contact_body", "contact_force",

@@ -11,7 +11,7 @@ from dynresp.experiments.response_story import response_story
 from dynresp.motion.builtin import PREFIX
 from dynresp.physics.drawn_hits import Hit
 from dynresp.physics.impacts import Strike
-from dynresp.response.alignment.error_surface import landscape
+from dynresp.response.alignment.error_surface import alignment_surface
 from dynresp.response.responder import Responder
 from dynresp.response.response import Response
 from dynresp.response.response_quality import Quality
@@ -87,7 +87,7 @@ def _write_alignment(path: Path, response: Response, title: str, responder: Resp
         raise NothingToShowError(f"the outcome is a {outcome(response)}, so nothing was aligned")
     assert response.entry is not None
     fps = response.motion.fps
-    found = landscape(response, responder.character, responder.config)
+    found = alignment_surface(response, responder.character, responder.config)
     ranking = [RankedReaction(name, error) for name, error in response.errors.items()]
     write_alignment(
         path,
@@ -126,8 +126,8 @@ def _subtitle(hit: Hit, response: Response) -> str:
 def _has_built_in(hit: Hit, response: Response) -> bool:
     """Whether any motion shown is a built-in motion."""
     names = [response.motion.name]
-    if response.entered is not None:
-        names.append(response.entered.name)
+    if response.entered_motion is not None:
+        names.append(response.entered_motion.name)
     if isinstance(hit.impact, Strike):
         names.append(hit.impact.motion.name)
     return any(name.startswith(PREFIX) for name in names)

@@ -10,7 +10,7 @@ from dynresp.response.choice import Chooser
 from dynresp.response.prediction.classifier import Classifier
 from dynresp.response.prediction.classifier_choice import ClassifierChooser
 from dynresp.response.response import ResponseConfig
-from dynresp.response.search.full_search_choice import OracleChooser
+from dynresp.response.search.full_search_choice import FullSearchChooser
 from dynresp.support.errors import UsageError
 
 Budget: TypeAlias = Literal["fast", "better", "best"]
@@ -45,7 +45,7 @@ def chooser_for(
     if budget not in BUDGETS:
         raise UsageError(f"the budget is one of {', '.join(BUDGETS)}, got {budget!r}")
     if budget == "best":
-        return OracleChooser(character, library, config)
+        return FullSearchChooser(character, library, config)
     if classifier is None:
         raise UsageError(
             f"the budget {budget!r} needs a trained classifier; give one, or take the budget 'best'"

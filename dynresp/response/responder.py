@@ -18,7 +18,7 @@ from dynresp.response.choice import Choice, Chooser
 from dynresp.response.hit_simulation import HitBatch, HitStage
 from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.response import Response, ResponseConfig
-from dynresp.response.search.full_search_choice import OracleChooser
+from dynresp.response.search.full_search_choice import FullSearchChooser
 from dynresp.response.transition.choice_to_motion import ending, finish
 from dynresp.support.errors import MotionError
 
@@ -52,7 +52,7 @@ class Responder:
         fps = self.config.physics.fps
         if self.config.window.fps != fps or any(r.motion.fps != fps for r in library.reactions):
             raise MotionError(f"simulation, search and library must all run at {fps:g} fps")
-        self.chooser = chooser or OracleChooser(character, library, self.config)
+        self.chooser = chooser or FullSearchChooser(character, library, self.config)
         self._stage = HitStage(character, self.config, threads)
 
     def respond(
@@ -105,7 +105,7 @@ class Responder:
                 responses[row],
                 graze=bool(seen.grazes[k]),
                 speed_change=float(seen.speed_changes[k]),
-                looked_ahead=seen.states_of(k),
+                look_ahead_states=seen.states_of(k),
             )
         tell("finishing", count, count)
         return responses
@@ -149,9 +149,9 @@ class Responder:
             entry=choice.entry + choice.offset if choice.offset else choice.entry,
             error=choice.error,
             errors=choice.errors,
-            entered=choice.motion,
-            left=end.left,
-            joined=end.joined,
+            entered_motion=choice.motion,
+            simulated_after_exit=end.left,
+            placed_before_end=end.joined,
             impactor=_impactor_track(final, start, len(poses)),
         )
 

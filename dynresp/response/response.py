@@ -129,9 +129,9 @@ class Response:
     graze: bool | None = None
     speed_change: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
-    looked_ahead: BodyStates | None = None
-    entered: Motion | None = None
-    left: FloatArray | None = None
-    joined: FloatArray | None = None
+    look_ahead_states: BodyStates | None = None
+    entered_motion: Motion | None = None
+    simulated_after_exit: FloatArray | None = None
+    placed_before_end: FloatArray | None = None
     impactor: FloatArray | None = None
     diverged: Divergence | None = None

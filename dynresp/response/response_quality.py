@@ -74,17 +74,17 @@ def measure(response: Response, character: Character) -> Quality | None:
     """Figures of a response; None where nothing was hit or the simulation diverged."""
     if response.exit is None or response.end is None or response.contact_frame is None:
         return None
-    assert response.entered is not None
+    assert response.entered_motion is not None
     motion = response.motion
     steps = joint_speed_steps(motion)
     at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
-    own = joint_speed_steps(response.entered)
+    own = joint_speed_steps(response.entered_motion)
     reference = max(float(np.percentile(own, _PERCENTILE)) if own.size else 0.0, _LEAST_REFERENCE)
-    assert response.left is not None
-    assert response.joined is not None
+    assert response.simulated_after_exit is not None
+    assert response.placed_before_end is not None
     jumps = [
-        _root_distance(motion.poses[response.exit + 1], response.left),
-        _root_distance(motion.poses[response.end - 1], response.joined),
+        _root_distance(motion.poses[response.exit + 1], response.simulated_after_exit),
+        _root_distance(motion.poses[response.end - 1], response.placed_before_end),
     ]
     # The first step of the blend, and the last.
     shakes = [root_shake(motion, k) for k in (response.exit, response.end - 1)]

@@ -32,13 +32,17 @@ from dynresp.bench import alignment_speed as bench_align
 from dynresp.bench import response_speed as bench_respond
 from dynresp.bench.machine import describe_machine, machine_line
 from dynresp.response.alignment.alignment import Aligner, AlignmentConfig
-from dynresp.response.alignment.error_surface import landscape
+from dynresp.response.alignment.error_surface import alignment_surface
 from dynresp.response.prediction.classifier_choice import ClassifierChooser
 from dynresp.response.prediction.hit_features import extract
 from dynresp.response.responder import Responder
 from dynresp.response.response import CARRY_ON
 from dynresp.response.search.full_search import ERROR_FLOOR
-from dynresp.response.search.full_search_choice import OracleChooser, entry_range, reaction_tracks
+from dynresp.response.search.full_search_choice import (
+    FullSearchChooser,
+    entry_range,
+    reaction_tracks,
+)
 
 study.style()
 data = study.dataset("walk")
@@ -77,8 +81,8 @@ fps = config.physics.fps
 fig = plt.figure(figsize=(13, 8.2))
 grid = fig.add_gridspec(2, 3, height_ratios=(1.1, 1))
 for column, response in enumerate(responses):
-    found = landscape(response, here.character, config)
-    trace = response.looked_ahead.centers, response.looked_ahead.quaternions
+    found = alignment_surface(response, here.character, config)
+    trace = response.look_ahead_states.centers, response.look_ahead_states.quaternions
     pictures.landscape_in_space(
         fig.add_subplot(grid[0, column], projection="3d"), found, words(response.choice)
     )
@@ -89,7 +93,7 @@ for column, response in enumerate(responses):
         (at,) = Aligner(tracks, window, own).align(*trace, [response.choice])
         if not path or (at.exit_frame, at.entry_frame) != path[-1]:
             path.append((at.exit_frame, at.entry_frame))
-    first, last = entry_range(len(response.entered.poses), config)
+    first, last = entry_range(len(response.entered_motion.poses), config)
     sampled = pictures.Sampled.of(window.exit_frames, (first, last - 1), settings.step_s, fps)
     ax = fig.add_subplot(grid[1, column])
     pictures.way_down(ax, found, sampled, np.array(path) / fps, at)
@@ -168,7 +172,7 @@ CHOOSERS = {
     "fast, no set left out": ClassifierChooser(
         *common, classifier, alignment=AlignmentConfig(sets_without_gain=100)
     ),
-    "best": OracleChooser(*common),
+    "best": FullSearchChooser(*common),
 }
 
 

@@ -15,7 +15,7 @@ from study import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dynresp.bench.measure import BenchResult
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.alignment.alignment_result import Alignment
-from dynresp.response.alignment.error_surface import Landscape
+from dynresp.response.alignment.error_surface import AlignmentSurface
 
 _STAGE_COLOURS = {
     "physics": GREY,
@@ -52,7 +52,7 @@ def _spaced(first: int, last: int, step: float) -> FloatArray:
     return np.linspace(first, last, math.ceil((last - first) / step) + 1)
 
 
-def landscape_in_space(space: Axes3D, found: Landscape, title: str) -> None:
+def landscape_in_space(space: Axes3D, found: AlignmentSurface, title: str) -> None:
     """Draw window errors over exit and entry."""
     x, y = np.meshgrid(found.entries_s, found.exits_s)
     space.plot_surface(x, y, found.errors, cmap="viridis_r", rcount=40, ccount=40, linewidth=0)
@@ -62,7 +62,7 @@ def landscape_in_space(space: Axes3D, found: Landscape, title: str) -> None:
 
 
 def way_down(
-    ax: Axes, found: Landscape, sampled: Sampled, path_s: FloatArray, at: Alignment
+    ax: Axes, found: AlignmentSurface, sampled: Sampled, path_s: FloatArray, at: Alignment
 ) -> None:
     """Draw a landscape from above, with what an alignment looked at and how it went down.
 

@@ -28,7 +28,7 @@ from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import default_character
 from dynresp.motion.reactions.reaction_library import default_library
 from dynresp.physics.impacts import Ball
-from dynresp.response.alignment.error_surface import landscape
+from dynresp.response.alignment.error_surface import alignment_surface
 from dynresp.response.responder import Responder
 from dynresp.response.response import CARRY_ON
 from dynresp.response.response_quality import measure
@@ -62,7 +62,7 @@ print(f"choice: {response.choice}, window error {response.error:.2f} m")
 # the colour plate of Zordan et al. 2007): the error mostly grows with time under physics.
 
 # %%
-surface = landscape(response, character, responder.config)
+surface = alignment_surface(response, character, responder.config)
 fig, ax = plt.subplots(figsize=(7, 4))
 image = ax.pcolormesh(surface.entries_s, surface.exits_s, surface.errors, cmap="viridis_r")
 ax.set(

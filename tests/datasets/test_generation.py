@@ -324,11 +324,11 @@ def test_a_shard_that_came_damaged_is_not_written(
 def test_diverged_samples_are_kept_and_marked(
     sample_worker: SampleWorker, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from dynresp.response.search.hit_labels import Labelled
+    from dynresp.response.search.hit_labels import HitLabels
 
     label = sample_worker._labeller.label
 
-    def diverging(hits: Any) -> Labelled:
+    def diverging(hits: Any) -> HitLabels:
         found = label(hits)
         found.outcome[0] = 2
         return found

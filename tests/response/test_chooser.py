@@ -21,7 +21,7 @@ from dynresp.response.prediction.classifier_choice import ClassifierChooser
 from dynresp.response.prediction.classifier_file import load_classifier, load_pipelines
 from dynresp.response.response import CARRY_ON, ResponseConfig
 from dynresp.response.response_settings import settings_record
-from dynresp.response.search.full_search_choice import OracleChooser
+from dynresp.response.search.full_search_choice import FullSearchChooser
 from dynresp.support.errors import SpecError
 from dynresp.support.paths import classifier_file
 
@@ -82,7 +82,7 @@ def test_it_chooses_by_default(tmp_path: Path) -> None:
 
 def test_the_oracle_chooses_on_request(tmp_path: Path) -> None:
     run = prepared(tmp_path, choice={"budget": "best"})
-    assert isinstance(run.responder.chooser, OracleChooser)
+    assert isinstance(run.responder.chooser, FullSearchChooser)
     assert run.record()["choosing"] == {"budget": "best"}
 
 
@@ -93,7 +93,7 @@ def test_and_for_want_of_a_classifier(tmp_path: Path, character: Character) -> N
     from dynresp.experiments.experiment_reader import read_experiment
 
     run = prepare_run(read_experiment(file), tmp_path, tmp_path / "motions", threads=1)
-    assert isinstance(run.responder.chooser, OracleChooser)
+    assert isinstance(run.responder.chooser, FullSearchChooser)
     assert run.record()["choosing"] == {"budget": "best", "instead_of": "fast"}
 
 

@@ -110,9 +110,9 @@ class TestAHit:
         for response in responses:
             assert response.end is not None
             assert response.entry is not None
-            assert response.entered is not None
+            assert response.entered_motion is not None
             rest = response.motion.poses[response.end + 1 :]
-            clip = response.entered.poses[response.entry + 11 :][: len(rest)]
+            clip = response.entered_motion.poses[response.entry + 11 :][: len(rest)]
             placed = place_on(clip, 0, rest[0])
             _same_but_for_the_legs(rest, placed)
 
@@ -122,10 +122,10 @@ class TestAHit:
         for response in responses:
             assert response.exit is not None
             assert response.entry is not None
-            assert response.entered is not None
+            assert response.entered_motion is not None
             _, trace = _simulated(character, base, response)
             left = trace.poses[response.exit - response.start]
-            placed = place_on(response.entered.poses[response.entry :], 0, left)
+            placed = place_on(response.entered_motion.poses[response.entry :], 0, left)
             rest = response.motion.poses[response.exit + 11 :]
             _same_but_for_the_legs(rest, placed[11 : 11 + len(rest)])
             if response.choice == CARRY_ON:

@@ -43,9 +43,9 @@ def _response(motion: Motion, contact: int, leave: int, end: int) -> Response:
         end=end,
         choice="itself",
         entry=leave,
-        entered=motion,
-        left=motion.poses[leave + 1],
-        joined=motion.poses[end - 1],
+        entered_motion=motion,
+        simulated_after_exit=motion.poses[leave + 1],
+        placed_before_end=motion.poses[end - 1],
     )
 
 
@@ -173,7 +173,10 @@ class TestRootJump:
         left, joined = motion.poses[21].copy(), motion.poses[29].copy()
         left[:3] += (0.003, 0.004, 0.0)
         joined[ROOT_QUAT] = rotations.multiply(rotations.from_yaw(0.02), joined[ROOT_QUAT])
-        moved = _measured(dataclasses.replace(plain, left=left, joined=joined), character)
+        moved = _measured(
+            dataclasses.replace(plain, simulated_after_exit=left, placed_before_end=joined),
+            character,
+        )
         assert moved.root_jump_m == pytest.approx(0.005)
         assert moved.root_jump_deg == pytest.approx(math.degrees(0.02))
 
@@ -244,7 +247,9 @@ class TestMeasure:
         calm = turned(character, {"left_elbow": np.outer(swing, [0.0, -1.0, 0.0])}, 61)
         kicked = np.outer(swing + 2.0 * np.maximum(time - time[seam], 0.0), [0.0, -1.0, 0.0])
         motion = Motion(turned(character, {"left_elbow": kicked}, 61), FPS)
-        response = dataclasses.replace(_response(motion, 10, 20, 32), entered=Motion(calm, FPS))
+        response = dataclasses.replace(
+            _response(motion, 10, 20, 32), entered_motion=Motion(calm, FPS)
+        )
         quality = _measured(response, character)
         at, other = quality.speed_step_exit, quality.speed_step_end
         if name == "end":

@@ -18,7 +18,7 @@ from dynresp.support.errors import MotionError
 
 
 @dataclass(frozen=True)
-class Landscape:
+class AlignmentSurface:
     """Window errors of what was chosen, for all exits and entries.
 
     Attributes:
@@ -32,7 +32,9 @@ class Landscape:
     entries_s: FloatArray
 
 
-def landscape(response: Response, character: Character, config: ResponseConfig) -> Landscape:
+def alignment_surface(
+    response: Response, character: Character, config: ResponseConfig
+) -> AlignmentSurface:
     """Search everything that the choice of a response could have been aligned to.
 
     Args:
@@ -43,7 +45,7 @@ def landscape(response: Response, character: Character, config: ResponseConfig) 
     Raises:
         MotionError: Nothing was chosen.
     """
-    seen, entered, entry = response.looked_ahead, response.entered, response.entry
+    seen, entered, entry = response.look_ahead_states, response.entered_motion, response.entry
     if seen is None or entered is None or entry is None or response.choice is None:
         raise MotionError("nothing was chosen, so there is nothing to align")
     assert response.contact_frame is not None
@@ -65,4 +67,6 @@ def landscape(response: Response, character: Character, config: ResponseConfig) 
     cut = trace_windows(seen.centers, seen.quaternions, window)
     found = search(cut, library_windows([track], window)).surface(response.choice)
     entries_s = np.asarray((found.entry_frames + first) / fps, np.float64)
-    return Landscape(found.errors, np.asarray(found.exit_frames / fps, np.float64), entries_s)
+    return AlignmentSurface(
+        found.errors, np.asarray(found.exit_frames / fps, np.float64), entries_s
+    )

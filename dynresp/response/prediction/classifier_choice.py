@@ -17,7 +17,7 @@ from dynresp.response.look_ahead import LookAhead
 from dynresp.response.prediction.classifier import Classifier, ClassifierError, TrainedFor
 from dynresp.response.prediction.hit_features import extract
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.response.search.carry_on import BaseFit, align_base_motions
+from dynresp.response.search.carry_on import BaseMotionFit, align_base_motions
 from dynresp.response.search.full_search_choice import reaction_tracks
 
 
@@ -98,7 +98,7 @@ class ClassifierChooser:
         classes = [own for own in members if CARRY_ON not in own][: self._best]
         return [name for own in classes for name in own]
 
-    def _choose(self, hits: LookAhead, row: int, names: list[str], stay: BaseFit) -> Choice:
+    def _choose(self, hits: LookAhead, row: int, names: list[str], stay: BaseMotionFit) -> Choice:
         """To carry on, or the best of what was predicted."""
         errors = {CARRY_ON: stay.error}
         carry_on = Choice(CARRY_ON, hits.bases[row], stay.exit, stay.entry, stay.error, errors)

@@ -18,7 +18,7 @@ from dynresp.response.hit_simulation import HitStage
 from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.response import ResponseConfig
 from dynresp.response.runtime.dynamic_responder import DynamicResponder, EventKind, Flight, Phase
-from dynresp.response.search.full_search_choice import OracleChooser
+from dynresp.response.search.full_search_choice import FullSearchChooser
 from dynresp.response.transition.choice_to_motion import ending, finish
 from dynresp.response.transition.transition import blend_onto, place_on
 from dynresp.support.errors import MotionError, UsageError
@@ -78,7 +78,7 @@ class Crowd:
             DynamicResponder(base, character, self.config.physics) for base in bases
         )
         self._character = character
-        self._chooser = chooser or OracleChooser(character, library, self.config)
+        self._chooser = chooser or FullSearchChooser(character, library, self.config)
         self._stage = stage or HitStage(character, self.config, threads)
         self._simulations: dict[ImpactorKind, Simulation] = {}
 

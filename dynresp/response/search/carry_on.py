@@ -19,7 +19,7 @@ from dynresp.response.windows.windows import ReactionTrack, library_windows, mak
 
 
 @dataclass(frozen=True)
-class BaseFit:
+class BaseMotionFit:
     """How the base motion fits a hit.
 
     Attributes:
@@ -35,7 +35,7 @@ class BaseFit:
 
 def search_base_motions(
     character: Character, config: ResponseConfig, hits: LookAhead
-) -> list[BaseFit]:
+) -> list[BaseMotionFit]:
     """Fit base motions as the oracle does; each with the bits it would have alone.
 
     Args:
@@ -54,7 +54,7 @@ def search_base_motions(
 
 def align_base_motions(
     character: Character, config: ResponseConfig, hits: LookAhead
-) -> list[BaseFit]:
+) -> list[BaseMotionFit]:
     """The same, but for rounding, in a tenth of the time: without cutting windows for a search.
 
     Args:
@@ -96,6 +96,6 @@ def _near(
     return list(zip(tracks, leaves.tolist(), firsts.tolist(), strict=True))
 
 
-def _fit(hits: LookAhead, row: int, error: float, leave: int, entry: int) -> BaseFit:
+def _fit(hits: LookAhead, row: int, error: float, leave: int, entry: int) -> BaseMotionFit:
     # A base motion that has ended holds its last pose.
-    return BaseFit(error, leave, min(max(entry, 0), len(hits.bases[row]) - 1))
+    return BaseMotionFit(error, leave, min(max(entry, 0), len(hits.bases[row]) - 1))

@@ -56,7 +56,7 @@ class ErrorSurface:
 
 
 @dataclass(frozen=True)
-class OracleResult:
+class FullSearchResult:
     """What an exhaustive search found.
 
     Attributes:
@@ -112,7 +112,9 @@ class OracleResult:
         )
 
 
-def search(trace: WindowSet, library: LibraryWindows, *, early_stop: bool = True) -> OracleResult:
+def search(
+    trace: WindowSet, library: LibraryWindows, *, early_stop: bool = True
+) -> FullSearchResult:
     """Find the best exit and entry for every reaction, on one thread.
 
     Args:
@@ -142,7 +144,7 @@ def search(trace: WindowSet, library: LibraryWindows, *, early_stop: bool = True
         )
     errors, exits, entries, _ = _run(trace, library, early_stop=early_stop)
     starts = [w.starts[at] for w, at in zip(library.windows, entries, strict=True)]
-    return OracleResult(
+    return FullSearchResult(
         names=library.names,
         errors=errors,
         exit_frames=trace.starts[exits],

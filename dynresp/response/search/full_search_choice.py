@@ -12,8 +12,8 @@ from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.response.choice import Choice
 from dynresp.response.look_ahead import LookAhead
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.response.search.carry_on import BaseFit, search_base_motions
-from dynresp.response.search.full_search import OracleResult, search
+from dynresp.response.search.carry_on import BaseMotionFit, search_base_motions
+from dynresp.response.search.full_search import FullSearchResult, search
 from dynresp.response.windows.windows import (
     LibraryWindows,
     ReactionTrack,
@@ -23,18 +23,18 @@ from dynresp.response.windows.windows import (
 
 
 @dataclass(frozen=True)
-class OracleAnswer:
-    """What the search found for one hit.
+class FullSearchAnswer:
+    """What the full search found for one hit.
 
     Attributes:
-        library: Of all reactions.
-        carry_on: How the base motion fits.
-        stays: Whether the base motion is carried on.
+        reactions: How the reactions fit.
+        base_motion: How the base motion fits.
+        carries_on: Whether the choice is no reaction (carry on).
     """
 
-    library: OracleResult
-    carry_on: BaseFit
-    stays: bool
+    reactions: FullSearchResult
+    base_motion: BaseMotionFit
+    carries_on: bool
 
 
 def reaction_tracks(
@@ -61,7 +61,7 @@ def entry_range(frames: int, config: ResponseConfig) -> tuple[int, int]:
     return 0, max(1, min(latest, frames - left))
 
 
-class OracleChooser:
+class FullSearchChooser:
     """Chooses by exhaustive search (Zordan et al. 2005; 2007, section 4).
 
     A graze is carried on through. Else the reaction of the least window error is chosen, unless
@@ -87,10 +87,10 @@ class OracleChooser:
         """Choose for each hit."""
         choices = []
         for base, answer in zip(hits.bases, self.answers(hits), strict=True):
-            best, stay = answer.library.best, answer.carry_on
-            found = zip(answer.library.names, answer.library.errors, strict=True)
+            best, stay = answer.reactions.best, answer.base_motion
+            found = zip(answer.reactions.names, answer.reactions.errors, strict=True)
             errors = {name: float(e) for name, e in found} | {CARRY_ON: stay.error}
-            if answer.stays:
+            if answer.carries_on:
                 choice = Choice(CARRY_ON, base, stay.exit, stay.entry, stay.error, errors)
             else:
                 motion = self.library.reaction(best.reaction).motion
@@ -99,7 +99,7 @@ class OracleChooser:
             choices.append(choice)
         return choices
 
-    def answers(self, hits: LookAhead) -> list[OracleAnswer]:
+    def answers(self, hits: LookAhead) -> list[FullSearchAnswer]:
         """Search for each hit; each is bitwise what it would be alone."""
         if not len(hits):
             return []
@@ -112,12 +112,12 @@ class OracleChooser:
         for cut, stay, graze in zip(cuts, carried, hits.grazes, strict=True):
             found = search(cut, self.windows)
             limit = min(found.best.error, self.config.carry_on_max_error)
-            answers.append(OracleAnswer(found, stay, bool(graze) or stay.error <= limit))
+            answers.append(FullSearchAnswer(found, stay, bool(graze) or stay.error <= limit))
         return answers
 
 
 def choice_columns(
-    answers: list[OracleAnswer],
+    answers: list[FullSearchAnswer],
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64], npt.NDArray[np.int64], list[int]]:
     """What the oracle found for each hit as arrays over all classes, carrying on the last.
 
@@ -125,11 +125,13 @@ def choice_columns(
         Errors [m], exit frames after contact and entry frames, each (hits, reactions + 1), and
         the class chosen for each hit. The entry of carrying on counts in the base motion.
     """
-    errors = [[*a.library.errors, a.carry_on.error] for a in answers]
-    exits = [[*a.library.exit_frames, a.carry_on.exit] for a in answers]
-    entries = [[*a.library.entry_frames, a.carry_on.entry] for a in answers]
+    errors = [[*a.reactions.errors, a.base_motion.error] for a in answers]
+    exits = [[*a.reactions.exit_frames, a.base_motion.exit] for a in answers]
+    entries = [[*a.reactions.entry_frames, a.base_motion.entry] for a in answers]
     chosen = [
-        len(a.library.names) if a.stays else a.library.names.index(a.library.best.reaction)
+        len(a.reactions.names)
+        if a.carries_on
+        else a.reactions.names.index(a.reactions.best.reaction)
         for a in answers
     ]
     return np.array(errors, np.float32), np.array(exits), np.array(entries), chosen

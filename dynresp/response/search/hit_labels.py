@@ -17,14 +17,14 @@ from dynresp.response.hit_simulation import HitBatch, HitStage
 from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.prediction.hit_features import FEATURE_NAMES, extract
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.response.search.full_search_choice import OracleChooser, choice_columns
+from dynresp.response.search.full_search_choice import FullSearchChooser, choice_columns
 
 OUTCOMES = ("hit", "miss", "diverged")
 """What can come of a hit: contact, none, or a simulation that blew up."""
 
 
 @dataclass(frozen=True)
-class Labelled:
+class HitLabels:
     """Labelled hits, arrays over n of them. Numbers of what was not hit are NaN, indices -1.
 
     Attributes:
@@ -60,7 +60,7 @@ class Labelled:
     entry_frames: npt.NDArray[np.int16]
 
 
-class Labeller:
+class HitLabeller:
     """Simulates hits and lets the oracle choose.
 
     Attributes:
@@ -91,9 +91,9 @@ class Labeller:
         self.classes = (*(reaction.name for reaction in library.reactions), CARRY_ON)
         self.feature_names = FEATURE_NAMES
         self._stage = HitStage(character, config, threads)
-        self._oracle = OracleChooser(character, library, config)
+        self._oracle = FullSearchChooser(character, library, config)
 
-    def label(self, hits: Sequence[tuple[Motion, Impact]]) -> Labelled:
+    def label(self, hits: Sequence[tuple[Motion, Impact]]) -> HitLabels:
         """Label hits; each is bitwise what it would be alone.
 
         Args:
@@ -111,7 +111,7 @@ class Labeller:
             self._tell_choices(labelled, batch, traces)
         return labelled
 
-    def _tell_contact(self, labelled: Labelled, row: int, start: int, trace: Trace) -> None:
+    def _tell_contact(self, labelled: HitLabels, row: int, start: int, trace: Trace) -> None:
         if trace.diverged is not None:
             labelled.outcome[row] = OUTCOMES.index("diverged")
         contact = trace.contact
@@ -125,7 +125,7 @@ class Labeller:
         labelled.contact_force[row] = contact.force
         labelled.contact_point[row] = contact.point
 
-    def _tell_choices(self, labelled: Labelled, batch: HitBatch, traces: Sequence[Trace]) -> None:
+    def _tell_choices(self, labelled: HitLabels, batch: HitBatch, traces: Sequence[Trace]) -> None:
         seen = look_ahead_of(self.character, self.config, batch.bases, batch.prepared, traces)
         if not len(seen):
             return
@@ -141,10 +141,10 @@ class Labeller:
         labelled.entry_frames[rows] = entries
         labelled.label[rows] = chosen
 
-    def _empty(self, count: int) -> Labelled:
+    def _empty(self, count: int) -> HitLabels:
         """As if every hit had missed."""
         classes = len(self.classes)
-        return Labelled(
+        return HitLabels(
             outcome=np.full(count, OUTCOMES.index("miss"), np.int8),
             contact_time_s=np.full(count, np.nan),
             contact_frame=np.full(count, -1, np.int32),

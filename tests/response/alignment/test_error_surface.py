@@ -8,7 +8,7 @@ from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.reactions.reaction_library import builtin_library
 from dynresp.physics.impacts import Ball, Impact
-from dynresp.response.alignment.error_surface import landscape
+from dynresp.response.alignment.error_surface import alignment_surface
 from dynresp.response.budget import chooser_for
 from dynresp.response.chooser import find_classifier
 from dynresp.response.responder import Responder
@@ -58,7 +58,7 @@ def test_the_choice_lies_on_the_grid(responses: list[Response], character: Chara
         assert response.exit is not None
         assert response.contact_frame is not None
         assert response.entry is not None
-        found = landscape(response, character, CONFIG)
+        found = alignment_surface(response, character, CONFIG)
         assert found.errors.shape == (len(found.exits_s), len(found.entries_s))
         apart = np.abs(found.exits_s - (response.exit - response.contact_frame) / 30.0)
         beside = np.abs(found.entries_s - response.entry / 30.0)
@@ -75,7 +75,7 @@ def test_a_reaction_goes_on_from_between_its_frames(
     for response in responses:
         if response.choice == CARRY_ON:
             continue
-        assert response.entered is not None
+        assert response.entered_motion is not None
         assert response.entry is not None
         assert response.end is not None
         assert response.exit is not None
@@ -95,4 +95,4 @@ def test_a_miss_has_none(character: Character, thrown: list[tuple[Motion, Impact
     library = builtin_library(character)
     miss = Responder(character, library, CONFIG, 1).respond([(thrown[0][0], Ball(2.0, offset=3.0))])
     with pytest.raises(MotionError, match="nothing was chosen"):
-        landscape(miss[0], character, CONFIG)
+        alignment_surface(miss[0], character, CONFIG)

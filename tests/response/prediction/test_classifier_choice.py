@@ -22,7 +22,7 @@ from dynresp.response.prediction.hit_features import FEATURE_NAMES, SLICES_S, ve
 from dynresp.response.responder import Responder
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.search.carry_on import align_base_motions, search_base_motions
-from dynresp.response.search.hit_labels import Labelled, Labeller
+from dynresp.response.search.hit_labels import HitLabeller, HitLabels
 from dynresp.support.errors import UsageError
 from tests.response.samples import FLUFF, WatchedCrowd, same_response
 
@@ -51,12 +51,12 @@ def thrown(base: Motion) -> list[tuple[Motion, Impact]]:
 @pytest.fixture(scope="module")
 def labelled(
     character: Character, library: ReactionLibrary, thrown: list[tuple[Motion, Impact]]
-) -> Labelled:
-    return Labeller(character, library, CONFIG).label(thrown)
+) -> HitLabels:
+    return HitLabeller(character, library, CONFIG).label(thrown)
 
 
 @pytest.fixture(scope="module")
-def classifier(character: Character, library: ReactionLibrary, labelled: Labelled) -> Classifier:
+def classifier(character: Character, library: ReactionLibrary, labelled: HitLabels) -> Classifier:
     """Trained on the very hits that it is asked about, so that it knows them."""
     from sklearn.decomposition import PCA
     from sklearn.pipeline import make_pipeline
@@ -162,7 +162,7 @@ def test_a_strategy_has_all_its_reactions_aligned(
     character: Character,
     library: ReactionLibrary,
     thrown: list[tuple[Motion, Impact]],
-    labelled: Labelled,
+    labelled: HitLabels,
     classifier: Classifier,
 ) -> None:
     """Two classes alone: to carry on, and everything else."""

@@ -15,7 +15,7 @@ from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
 from dynresp.physics.simulation import Simulation
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.runtime.dynamic_responder import DynamicResponder, EventKind, Phase
-from dynresp.response.search.full_search_choice import OracleChooser
+from dynresp.response.search.full_search_choice import FullSearchChooser
 from dynresp.response.transition.transition import TransitionConfig
 from dynresp.response.windows.window_config import WindowErrorConfig
 from dynresp.support.errors import MotionError, SpecError, UsageError
@@ -255,7 +255,7 @@ def test_a_chooser_made_with_other_settings_is_refused(
     character: Character, library: ReactionLibrary, base: Motion
 ) -> None:
     config = ResponseConfig(window=WindowErrorConfig(fps=30.0, exit_max_s=0.9))
-    chooser = OracleChooser(character, library, config)
+    chooser = FullSearchChooser(character, library, config)
     with pytest.raises(UsageError, match="made with another config"):
         WatchedCrowd(character, library, [base], chooser=chooser)
     other = tiny_library(backing=walking(character, 1.5, speed=-1.0))

@@ -13,7 +13,7 @@ from dynresp.bench.measure import Contender, median_seconds
 from dynresp.bench.window_error_twin import angle_between
 from dynresp.motion import rotations
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.search.full_search import ERROR_FLOOR, OracleResult, search
+from dynresp.response.search.full_search import ERROR_FLOOR, FullSearchResult, search
 from dynresp.response.windows.windows import (
     LANES,
     ReactionTrack,
@@ -47,7 +47,7 @@ def _placed(track: Track, x: float, y: float, yaw: float) -> Track:
 
 def _search(
     trace: Track, tracks: list[ReactionTrack], config: WindowErrorConfig = CONFIG
-) -> OracleResult:
+) -> FullSearchResult:
     library = library_windows(tracks, config)
     windows = trace_windows(*trace, config)
     result = search(windows, library)
@@ -59,7 +59,7 @@ def _search(
 
 def _assert_equals_twin(
     trace: Track, tracks: list[ReactionTrack], config: WindowErrorConfig = CONFIG
-) -> OracleResult:
+) -> FullSearchResult:
     result = _search(trace, tracks, config)
     for track in tracks:
         expected, exits, entries = window_error.reaction_surface(trace, track, config)

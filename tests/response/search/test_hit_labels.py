@@ -12,23 +12,23 @@ from dynresp.physics.impacts import Ball, Impact
 from dynresp.response.hit_simulation import HitStage
 from dynresp.response.prediction.hit_features import extract
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
-from dynresp.response.search.hit_labels import OUTCOMES, Labelled, Labeller
+from dynresp.response.search.hit_labels import OUTCOMES, HitLabeller, HitLabels
 
 MISS = Ball(1.2, offset=3.0)
 
 
 @pytest.fixture(scope="module")
-def labeller(character: Character, library: ReactionLibrary) -> Labeller:
-    return Labeller(character, library, ResponseConfig())
+def labeller(character: Character, library: ReactionLibrary) -> HitLabeller:
+    return HitLabeller(character, library, ResponseConfig())
 
 
 @pytest.fixture(scope="module")
-def labelled(labeller: Labeller, hits: list[tuple[Motion, Impact]], base: Motion) -> Labelled:
+def labelled(labeller: HitLabeller, hits: list[tuple[Motion, Impact]], base: Motion) -> HitLabels:
     return labeller.label([*hits, (base, MISS)])
 
 
 def test_labels_are_what_the_responder_chooses(
-    labeller: Labeller, labelled: Labelled, responses: list[Response]
+    labeller: HitLabeller, labelled: HitLabels, responses: list[Response]
 ) -> None:
     for row, response in enumerate(responses):
         assert OUTCOMES[labelled.outcome[row]] == "hit"
@@ -49,7 +49,7 @@ def test_labels_are_what_the_responder_chooses(
 
 
 def test_features_are_those_of_the_simulation(
-    character: Character, labelled: Labelled, hits: list[tuple[Motion, Impact]]
+    character: Character, labelled: HitLabels, hits: list[tuple[Motion, Impact]]
 ) -> None:
     (batch,) = HitStage(character, ResponseConfig(), 1).batches(hits[1:2])
     (trace,) = batch.simulation.look_ahead(0.6)
@@ -60,7 +60,7 @@ def test_features_are_those_of_the_simulation(
     np.testing.assert_array_equal(labelled.features[1], seen[0])
 
 
-def test_a_miss_is_a_miss(labelled: Labelled) -> None:
+def test_a_miss_is_a_miss(labelled: HitLabels) -> None:
     assert OUTCOMES[labelled.outcome[-1]] == "miss"
     assert labelled.label[-1] == -1
     assert np.isnan(labelled.features[-1]).all()
@@ -69,16 +69,16 @@ def test_a_miss_is_a_miss(labelled: Labelled) -> None:
 
 
 def test_each_is_bitwise_what_it_would_be_alone(
-    labeller: Labeller, labelled: Labelled, hits: list[tuple[Motion, Impact]], base: Motion
+    labeller: HitLabeller, labelled: HitLabels, hits: list[tuple[Motion, Impact]], base: Motion
 ) -> None:
     every = [*hits, (base, MISS)]
     for row, hit in enumerate(every):
         alone = labeller.label([hit])
-        for item in fields(Labelled):
+        for item in fields(HitLabels):
             np.testing.assert_array_equal(
                 getattr(alone, item.name)[0], getattr(labelled, item.name)[row], item.name
             )
 
 
-def test_nothing_is_labelled_where_nothing_is_given(labeller: Labeller) -> None:
+def test_nothing_is_labelled_where_nothing_is_given(labeller: HitLabeller) -> None:
     assert len(labeller.label([]).label) == 0
