@@ -19,7 +19,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import wrapped
 from dynresp.locomotion.vision.segmentation import Picture, SegmentationConfig
 from dynresp.locomotion.vision.video_control import VideoControl
-from dynresp.locomotion.vision.video_following import Followed, follow
+from dynresp.locomotion.vision.video_following import FollowStep, follow
 from dynresp.motion.character import Character
 from dynresp.results.result_folder import WATCHING
 from dynresp.support.errors import DynrespError, MotionFileError, UsageError
@@ -129,13 +129,13 @@ def video_run(
     _compile(model, start)
     control = VideoControl(model.forest, model.table, model.recogniser)
     reel = _Reel(pictures, settings, progress)
-    steps: list[Followed] = []
+    steps: list[FollowStep] = []
     slowest = 0.0
     begun = before = time.perf_counter()
     for step in follow(reel, settings.fps, control, start, rng):
         reel.keep(step)
         # Masks are large; the reel keeps those that are shown.
-        steps.append(Followed(step.time_s, step.frames, step.cluster, step.told, None))
+        steps.append(FollowStep(step.time_s, step.frames, step.cluster, step.person_cluster, None))
         now = time.perf_counter()
         slowest = max(slowest, now - before - reel.waited_since())
         before = now
@@ -144,7 +144,7 @@ def video_run(
     _check_length(settings, reel.count, missing)
     if missing:
         remark(f"{settings.name}: {missing}")
-    if not any(step.told is not None for step in steps):
+    if not any(step.person_cluster is not None for step in steps):
         raise DynrespError(
             f"no person is seen in {settings.name}, {steps[-1].time_s:.1f} s; the first second "
             "must show the empty room, the camera must not move, and the whole person must be in "
@@ -248,13 +248,13 @@ class _Reel:
         waited, self._reported = self.waited_s - self._reported, self.waited_s
         return waited
 
-    def keep(self, step: Followed) -> None:
+    def keep(self, step: FollowStep) -> None:
         """Keep the moment of every second choice (later: fourth ...) in which a person is seen."""
         require("cv2")
         import cv2
 
         self._steps += 1
-        if step.mask is None or step.told is None or self._steps % self._every:
+        if step.mask is None or step.person_cluster is None or self._steps % self._every:
             return
         assert self._last is not None
         height, width = step.mask.shape
@@ -270,7 +270,7 @@ def _run(
     character: Character,
     model: VideoModel,
     start: int,
-    steps: Sequence[Followed],
+    steps: Sequence[FollowStep],
     reel: _Reel,
     settings: VideoSettings,
     fps: float,
@@ -281,7 +281,7 @@ def _run(
     clusters = model.forest.clusters
     played = np.cumsum([len(step.frames) for step in steps])
     times = [step.time_s for step in steps]
-    person = [step.told for step in steps]
+    person = [step.person_cluster for step in steps]
     chosen = [step.cluster for step in steps]
     avatar = [int(clusters.labels[path[number]]) for number in played]
     seen = [(a, b) for a, b in zip(person, avatar, strict=True) if a is not None]

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.graph.frame_database import MotionDatabase
-from dynresp.locomotion.vision.observation import Sighting, sightings
+from dynresp.locomotion.vision.person_tracker import PictureFeatures, track_person
 from dynresp.locomotion.vision.silhouette_features import FeatureConfig
 from dynresp.locomotion.vision.silhouette_table import (
     ViewTable,
@@ -52,7 +52,7 @@ class Take:
     """
 
     person: str
-    seen: list[Sighting]
+    seen: list[PictureFeatures]
     empty_s: float
     truth: Motion
     seconds: float
@@ -76,7 +76,7 @@ class Gathered:
 
     def without(
         self, studio: str, config: FeatureConfig | None = None
-    ) -> tuple[MotionDatabase, ViewTable, Callable[[Take], list[Sighting]]]:
+    ) -> tuple[MotionDatabase, ViewTable, Callable[[Take], list[PictureFeatures]]]:
         """Database and table of all others, and what a take looks like in that table.
 
         Args:
@@ -87,7 +87,7 @@ class Gathered:
         database, kept = part_of(self.database, np.isin(self.owners, others))
         table, translate = part_of_table(self.table, database, kept, config or FeatureConfig())
 
-        def translated(take: Take) -> list[Sighting]:
+        def translated(take: Take) -> list[PictureFeatures]:
             return [replace(s, rows=[translate(row) for row in s.rows]) for s in take.seen]
 
         return database, table, translated
@@ -195,7 +195,7 @@ def takes_of(
             with Video(path) as video:
                 pictures = list(video)
             start = time.perf_counter()
-            seen = [replace(s, mask=None) for s in sightings(pictures, FPS, table)]
+            seen = [replace(s, mask=None) for s in track_person(pictures, FPS, table)]
             seconds = time.perf_counter() - start
             takes.append(Take(person.name, seen, filming.empty_s, truth, seconds))
     return takes

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynresp.locomotion.clusters.frame_clusters import Clusters
-from dynresp.locomotion.vision.video_following import Followed
+from dynresp.locomotion.vision.video_following import FollowStep
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
 
@@ -28,7 +28,7 @@ class Judged:
         truth: (m,) the actor's cluster at that moment.
         recent: (m, K) whether the actor was in each cluster within the last second.
         chosen: (m,) the cluster to which the chosen way leads.
-        told: (m,) the cluster that was told of the actor.
+        recognised: (m,) the cluster in which the person was most probably seen.
         own: (m,) the cluster that the avatar is in.
         lags: (c,) from an actor's change of cluster until it is chosen [s].
     """
@@ -36,14 +36,14 @@ class Judged:
     truth: IntArray
     recent: np.ndarray
     chosen: IntArray
-    told: IntArray
+    recognised: IntArray
     own: IntArray
     lags: FloatArray
 
     @classmethod
     def of(
         cls,
-        steps: Sequence[Followed],
+        steps: Sequence[FollowStep],
         clusters: Clusters,
         truth: IntArray,
         fps: float,
@@ -64,18 +64,18 @@ class Judged:
             now = int((step.time_s - empty_s) * fps + 1e-9)
             if second <= now < len(truth) and step.cluster is not None and len(step.frames):
                 label = int(clusters.labels[step.frames[-1]])
-                kept.append((now, step.cluster, step.told, label))
-        at, chosen, told, own = np.array(kept, dtype=np.int32).reshape(-1, 4).T
+                kept.append((now, step.cluster, step.person_cluster, label))
+        at, chosen, recognised, own = np.array(kept, dtype=np.int32).reshape(-1, 4).T
         recent = np.zeros((len(at), len(clusters.mixture)), dtype=bool)
         for back in range(second + 1):
             recent[np.arange(len(at)), truth[at - back]] = True
         lags = _lags(at, chosen, truth, fps)
-        return cls(truth[at].astype(np.int32), recent, chosen, told, own, lags)
+        return cls(truth[at].astype(np.int32), recent, chosen, recognised, own, lags)
 
     @classmethod
     def joined(cls, parts: Sequence[Judged]) -> Judged:
         """Several takes of one person."""
-        names = ("truth", "recent", "chosen", "told", "own", "lags")
+        names = ("truth", "recent", "chosen", "recognised", "own", "lags")
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
     def right(self, answers: IntArray | int) -> np.ndarray:

@@ -20,7 +20,7 @@ from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.vision.action_recognition import Recogniser
 from dynresp.locomotion.vision.video_control import VideoControl
-from dynresp.locomotion.vision.video_following import CHOICE_S, follow_sightings
+from dynresp.locomotion.vision.video_following import CHOICE_S, follow_features
 from dynresp.locomotion.vision.visible_clusters import (
     MAX_VISIBLE_CLUSTERS,
     find_visible_clusters,
@@ -190,7 +190,7 @@ def leave_out(
             control = VideoControl(forest, table, recogniser)
             seen, start = translated(take), int(rng.choice(graph.frames))
             began = time.perf_counter()
-            steps = list(follow_sightings(seen, control, start, rng))
+            steps = list(follow_features(seen, control, start, rng))
             choosing_s += time.perf_counter() - began
             parts.append(Judged.of(steps, clusters, truth, table.fps, take.empty_s))
         length = sum(take.seen[-1].time_s for take in own)

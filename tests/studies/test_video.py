@@ -11,7 +11,7 @@ from dynresp.locomotion.clusters.gaussian_mixture import Mixture
 from dynresp.locomotion.vision.silhouette_features import FeatureConfig
 from dynresp.locomotion.vision.silhouette_table import ViewTable
 from dynresp.locomotion.vision.silhouettes import Viewpoints
-from dynresp.locomotion.vision.video_following import Followed
+from dynresp.locomotion.vision.video_following import FollowStep
 from dynresp.motion.character import default_character
 from dynresp.motion.export import write_bvh
 from dynresp.motion.motion import Motion
@@ -41,9 +41,9 @@ def test_a_table_without_somebody_is_as_if_he_had_never_been_drawn(rng) -> None:
     np.testing.assert_allclose(translate(row), got.row(measured), atol=1e-3)
 
 
-def steps(clusters: list[int], frames: list[int]) -> list[Followed]:
+def steps(clusters: list[int], frames: list[int]) -> list[FollowStep]:
     return [
-        Followed(1.0 + 0.1 * (k + 1), np.array([frame]), cluster, cluster, None)
+        FollowStep(1.0 + 0.1 * (k + 1), np.array([frame]), cluster, cluster, None)
         for k, (cluster, frame) in enumerate(zip(clusters, frames, strict=True))
     ]
 

@@ -99,7 +99,7 @@ class Belief:
             row: (d,) as `ViewTable.row` gives it.
         """
         # Numba takes a third of a second to import.
-        from dynresp.locomotion.vision.belief_kernel import believe_kernel
+        from dynresp.locomotion.vision.belief_kernel import belief_step_kernel
 
         fresh = self.headings
         fresh = (1.0 - 2.0 * _NEIGHBOUR - _ANYWHERE) * fresh + _NEIGHBOUR * (
@@ -109,7 +109,7 @@ class Belief:
         fresh = (fresh + _ANYWHERE / len(fresh)) * (self._config.anew / len(self.states))
         seen = np.array(row, dtype=np.float32)
         seen.flags.writeable = False
-        believe_kernel(
+        belief_step_kernel(
             self.table.rows, seen, self._headings, self._past, fresh.astype(np.float32),
             self._pace, np.float32(self._config.drift), np.float32(0.5 / self._config.tolerance),
             self._scratch, self.states, self._after,

@@ -32,7 +32,7 @@ _FAST = {"contract", "nnan", "nsz", "reassoc"}
 
 
 @compiled(_SIGNATURE, error_model="numpy", fastmath=_FAST)
-def believe_kernel(
+def belief_step_kernel(
     table, row, headings, past, fresh, pace, drift, halved, distances, belief, after
 ):
     """Bring a belief one frame on, and weigh it with what is seen.

@@ -32,7 +32,7 @@ _DOUBT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class OpenWay:
+class OpenPath:
     """A way open to the avatar.
 
     Attributes:
@@ -44,7 +44,7 @@ class OpenWay:
     cluster: int
 
 
-def open_ways(forest: ClusterForest, frame: int, within_s: float) -> list[OpenWay]:
+def open_paths(forest: ClusterForest, frame: int, within_s: float) -> list[OpenPath]:
     """The ways open to an avatar at a frame: to stay in its cluster, and all cluster paths.
 
     Args:
@@ -70,7 +70,7 @@ def open_ways(forest: ClusterForest, frame: int, within_s: float) -> list[OpenWa
         frames = forest.stay(way, steps)[1:]
         if len(frames):
             led = np.bincount(labels[frames], minlength=count)
-            out.append(OpenWay(frames, int(led.argmax())))
+            out.append(OpenPath(frames, int(led.argmax())))
     return out
 
 
@@ -159,7 +159,7 @@ class VideoControl:
         """Take in what is seen, a frame of the database later than the last time.
 
         Args:
-            row: (d,) as `ViewTable.row` and `Watcher.see` give it.
+            row: (d,) as `ViewTable.row` and `PersonTracker.see` give it.
         """
         self._rows.append(row)
         self.belief.see(row)
@@ -170,7 +170,7 @@ class VideoControl:
         both = np.sqrt(told * (followed + _DOUBT))
         self.clusters = self._fading * self.clusters + (1.0 - self._fading) * both / both.sum()
 
-    def choose(self, frame: int) -> OpenWay:
+    def choose(self, frame: int) -> OpenPath:
         """What the avatar does next.
 
         Args:
@@ -182,7 +182,7 @@ class VideoControl:
         if not self._rows:
             raise UsageError("nobody has been seen yet; choose once a row has come")
         config = self._config
-        ways = open_ways(self.forest, frame, config.look_ahead_s)
+        ways = open_paths(self.forest, frame, config.look_ahead_s)
         labels = self.forest.clusters.labels
         steps = max(len(way.frames) for way in ways)
         fading = np.exp(-np.arange(steps) / (config.patience_s * self.table.fps))
@@ -206,7 +206,7 @@ def warped_costs(
     table: ViewTable,
     forest: ClusterForest,
     frame: int,
-    ways: Sequence[OpenWay],
+    ways: Sequence[OpenPath],
 ) -> FloatArray:
     """How unlike each way is to what was seen, from every viewpoint: the paper's cost.
 

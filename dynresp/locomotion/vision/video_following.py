@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynresp.locomotion.graph.random_walk import check_in_component, random_walk
-from dynresp.locomotion.vision.observation import Sighting, sightings
+from dynresp.locomotion.vision.person_tracker import PictureFeatures, track_person
 from dynresp.locomotion.vision.segmentation import Mask, Picture, SegmentationConfig
 from dynresp.locomotion.vision.video_control import VideoControl
 from dynresp.support.arrays import IntArray
@@ -18,21 +18,21 @@ CHOICE_S = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class FollowStep:
     """What the avatar does between a choice and the next.
 
     Attributes:
         time_s: When, from the first picture on [s].
         frames: (k,) frames of the graph that it plays after those before.
         cluster: The cluster to which the chosen way leads; None where nobody was seen so far.
-        told: The cluster in which the person is most probably; None likewise.
+        person_cluster: The cluster in which the person is most probably; None likewise.
         mask: The person's silhouette; None where nobody is seen.
     """
 
     time_s: float
     frames: IntArray
     cluster: int | None
-    told: int | None
+    person_cluster: int | None
     mask: Mask | None
 
 
@@ -43,7 +43,7 @@ def follow(
     frame: int,
     rng: np.random.Generator,
     segmentation: SegmentationConfig | None = None,
-) -> Iterator[Followed]:
+) -> Iterator[FollowStep]:
     """Choose for the avatar ten times a second.
 
     Until somebody is seen it goes by the graph's probabilities. Nothing is read ahead: what is
@@ -62,14 +62,14 @@ def follow(
         MotionError: A picture is none, or of another size than those before.
     """
     check_in_component(control.forest.graph, frame)
-    seen = sightings(pictures, fps, control.table, segmentation)
-    yield from follow_sightings(seen, control, frame, rng)
+    seen = track_person(pictures, fps, control.table, segmentation)
+    yield from follow_features(seen, control, frame, rng)
 
 
-def follow_sightings(
-    seen: Iterable[Sighting], control: VideoControl, frame: int, rng: np.random.Generator
-) -> Iterator[Followed]:
-    """The same from what the pictures told: see `follow` and `sightings`.
+def follow_features(
+    seen: Iterable[PictureFeatures], control: VideoControl, frame: int, rng: np.random.Generator
+) -> Iterator[FollowStep]:
+    """The same from what the pictures told: see `follow` and `track_person`.
 
     Raises:
         UsageError: The frame is not in the graph's component.
@@ -78,11 +78,11 @@ def follow_sightings(
     check_in_component(graph, frame)
     somebody = False
     played = chosen = 0
-    for sighting in seen:
-        for row in sighting.rows:
+    for features in seen:
+        for row in features.rows:
             control.see(row)
             somebody = True
-        time_s = sighting.time_s
+        time_s = features.time_s
         if int(time_s / CHOICE_S + 1e-9) == chosen:
             continue
         chosen = int(time_s / CHOICE_S + 1e-9)
@@ -98,5 +98,5 @@ def follow_sightings(
         if len(frames) < due:
             frames = random_walk(graph, due, rng, frame)
             frame = int(frames[-1])
-        told = int(np.argmax(control.clusters)) if somebody else None
-        yield Followed(time_s, frames.astype(np.int32), cluster, told, sighting.mask)
+        person_cluster = int(np.argmax(control.clusters)) if somebody else None
+        yield FollowStep(time_s, frames.astype(np.int32), cluster, person_cluster, features.mask)

@@ -11,9 +11,9 @@ from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.sketch.cluster_paths import SketchChooser
 from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.path_walk import SketchConfig, SketchedWalk
+from dynresp.locomotion.sketch.sketch_chooser import SketchChooser
 from dynresp.locomotion.sketch.sketch_control import follow_sketch, reach
 from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances

@@ -40,5 +40,5 @@ def test_what_strangers_do_is_followed_within_a_second(motions_folder) -> None:
     assert sum(len(fold.judged.truth) for fold in folds) > 200
     assert figures["right"] > 0.8
     assert figures["balanced"] > figures["constant_balanced"] + 0.2
-    right = np.concatenate([fold.judged.right(fold.judged.told) for fold in folds])
+    right = np.concatenate([fold.judged.right(fold.judged.recognised) for fold in folds])
     assert right.mean() > 0.8

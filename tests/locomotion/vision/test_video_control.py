@@ -7,7 +7,7 @@ from dynresp.locomotion.vision.action_recognition import Recogniser
 from dynresp.locomotion.vision.video_control import (
     ControlConfig,
     VideoControl,
-    open_ways,
+    open_paths,
     warped_costs,
 )
 from dynresp.support.errors import UsageError
@@ -21,7 +21,7 @@ def test_open_ways_go_along_the_graph(seed: int) -> None:
     graph = forest.graph
     edges = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
     for frame in graph.frames[::5].tolist():
-        ways = open_ways(forest, frame, 1.0)
+        ways = open_paths(forest, frame, 1.0)
         assert ways
         for way in ways:
             along = [frame, *way.frames.tolist()]
@@ -48,7 +48,7 @@ def test_clusters_without_frames_are_never_told(forest, table) -> None:
 
 
 def test_the_way_that_was_seen_costs_nothing(forest, table) -> None:
-    ways = open_ways(forest, 20, 2.0)
+    ways = open_paths(forest, 20, 2.0)
     seen = table.rows[ways[0].frames[:12], 6]
     costs = warped_costs(seen, table, forest, 20, ways)
     assert costs.shape == (len(ways), 18)

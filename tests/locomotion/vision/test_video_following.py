@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dynresp.locomotion.vision.observation import Watcher
+from dynresp.locomotion.vision.person_tracker import PersonTracker
 from dynresp.locomotion.vision.video_control import VideoControl
 from dynresp.locomotion.vision.video_following import follow
 from dynresp.locomotion.vision.video_reader import Video
@@ -30,15 +30,15 @@ def test_an_avatar_follows_a_stranger_in_a_file(forest, table, recogniser, tmp_p
     np.testing.assert_allclose(times, 0.1 * np.arange(1, len(times) + 1), atol=1e-6)
     assert len(times) == pytest.approx(90, abs=1)
     # The first second shows the room alone.
-    assert all(step.told is None for step in steps if step.time_s < 1.0)
-    assert all(step.told == STEPPING for step in steps if 2.0 < step.time_s < 5.0)
-    assert all(step.told == WAVING for step in steps if step.time_s > 6.0)
+    assert all(step.person_cluster is None for step in steps if step.time_s < 1.0)
+    assert all(step.person_cluster == STEPPING for step in steps if 2.0 < step.time_s < 5.0)
+    assert all(step.person_cluster == WAVING for step in steps if step.time_s > 6.0)
     labels = forest.clusters.labels
     assert all(labels[s.frames[-1]] == WAVING for s in steps if s.time_s > 7.0 and len(s.frames))
     played = np.concatenate([[130], *(step.frames for step in steps)])
     graph = forest.graph
-    ways = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
-    assert set(zip(played[:-1].tolist(), played[1:].tolist(), strict=True)) <= ways
+    paths = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
+    assert set(zip(played[:-1].tolist(), played[1:].tolist(), strict=True)) <= paths
     assert len(played) - 1 == int(times[-1] * 15 + 1e-9)
 
 
@@ -46,8 +46,8 @@ def test_an_avatar_follows_a_stranger_in_a_file(forest, table, recogniser, tmp_p
 def test_there_is_a_row_for_every_frame_of_the_database(table, tmp_path, fps) -> None:
     somebody = person("mmk", tmp_path)
     motion = Motion(stepping(somebody, round(2 * fps), fps), fps)
-    watcher = Watcher(table, fps)
-    rows = [row for p in film(motion, somebody, Filming(8, fps=fps)) for row in watcher.see(p)]
+    tracker = PersonTracker(table, fps)
+    rows = [row for p in film(motion, somebody, Filming(8, fps=fps)) for row in tracker.see(p)]
     assert len(rows) == pytest.approx(30, abs=2)
     assert np.isfinite(rows).all()
 

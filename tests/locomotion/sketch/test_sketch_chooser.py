@@ -3,7 +3,7 @@ import pytest
 
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.sketch.cluster_paths import SketchChooser
+from dynresp.locomotion.sketch.sketch_chooser import SketchChooser
 from dynresp.motion.character import Character
 from dynresp.support.errors import UsageError
 from tests.locomotion.clusters.forest_samples import random_forest

@@ -21,7 +21,7 @@ _SIZE_S = 1.0
 _LOST_S = 0.5
 
 
-class Watcher:
+class PersonTracker:
     """Finds the person in pictures and tells what is seen in the numbers of a table.
 
     Attributes:
@@ -104,12 +104,12 @@ class Watcher:
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class PictureFeatures:
     """What one picture tells.
 
     Attributes:
         time_s: When its time ends, from the first picture on [s].
-        rows: See `Watcher.see`.
+        rows: See `PersonTracker.see`.
         mask: The person's silhouette; None where nobody is seen.
     """
 
@@ -118,12 +118,12 @@ class Sighting:
     mask: Mask | None
 
 
-def sightings(
+def track_person(
     pictures: Iterable[Picture],
     fps: float,
     table: ViewTable,
     segmentation: SegmentationConfig | None = None,
-) -> Iterator[Sighting]:
+) -> Iterator[PictureFeatures]:
     """Look at pictures as they come, one sighting for each.
 
     Args:
@@ -136,7 +136,7 @@ def sightings(
         UsageError: The frame rate is not above 0.
         MotionError: A picture is none, or of another size than those before.
     """
-    watcher = Watcher(table, fps, segmentation)
+    tracker = PersonTracker(table, fps, segmentation)
     for count, picture in enumerate(pictures, start=1):
-        rows = watcher.see(picture)
-        yield Sighting(count / fps, rows, watcher.mask)
+        rows = tracker.see(picture)
+        yield PictureFeatures(count / fps, rows, tracker.mask)
