@@ -22,13 +22,17 @@ def demo(
     seed: Seed = None,
     budget: ChosenBudget = None,
     as_json: Json = False,
+    video: Annotated[
+        bool, typer.Option("--video", help="Also draw video.mp4, which takes about 10 s more.")
+    ] = False,
 ) -> None:
     """Run an example: a heavy ball hits a walking person.
 
-    It needs no network: without motion capture on this machine it uses built-in motions.
+    It writes the motion, a 3D recording and pictures, and a video only with --video. It needs no
+    network: without motion capture on this machine it uses built-in motions.
     """
     from dynresp.support.paths import example_specs
 
-    run_file(
-        example_specs("experiments") / EXAMPLE, out, motions, seed, as_json, choice_of(budget, None)
-    )
+    file = example_specs("experiments") / EXAMPLE
+    choice = choice_of(budget, None)
+    run_file(file, out, motions, seed, as_json, choice, without=() if video else ("video.mp4",))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import typer
 
-from dynresp.support.progress import Progress
+from dynresp.support.progress import Progress, hearing
 
 
 @contextmanager
@@ -18,7 +18,8 @@ def progress() -> Iterator[Progress]:
         with _bar() as report:
             yield report
     else:
-        yield _lines()
+        with hearing(lambda work: typer.echo(f"{work} ...", err=True)):
+            yield _lines()
 
 
 def _lines() -> Progress:
@@ -47,4 +48,5 @@ def _bar() -> Iterator[Progress]:
         def report(stage: str, done: int, of: int) -> None:
             bars.update(task, description=stage, completed=done, total=max(of, 1))
 
-        yield report
+        with hearing(lambda work: bars.console.print(f"{work} ...", highlight=False)):
+            yield report

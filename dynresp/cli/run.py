@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -46,6 +46,7 @@ def run_file(
     seed: int | None,
     as_json: bool,
     choice: dict[str, str],
+    without: Collection[str] = (),
 ) -> None:
     """Run an experiment file and print its results.
 
@@ -56,6 +57,7 @@ def run_file(
         seed: Used instead of the file's own.
         as_json: Print `result.json` or `summary.json` instead of text.
         choice: Keys of `[choice]` that replace the file's own.
+        without: Files that are not written, even if the experiment file asks for them.
 
     Raises:
         typer.Exit: With code 1, if every simulation diverged or a file could not be written. A
@@ -67,6 +69,8 @@ def run_file(
     from dynresp.results.result_json import to_json
 
     file = read_experiment(experiment)
+    write = tuple(name for name in file.output.write if name not in without)
+    file = file.model_copy(update={"output": file.output.model_copy(update={"write": write})})
     check_folder(out)
     with progress() as report:
         report("loading motions", 0, 1)

@@ -6,9 +6,9 @@ it is used. The sums are those of `rotations.multiply` and `rotations.rotate`, i
 
 from __future__ import annotations
 
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
 _INTS = types.Array(types.int64, 1, "C", readonly=True)
@@ -16,7 +16,7 @@ _OUT = types.float64[:, :, ::1]
 _SIGNATURE = types.void(_ROWS, _INTS, _ROWS, _ROWS, _OUT, _OUT, _OUT)
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _carry(q, v, start, out):
     """A point v of a frame that is turned by q and begins at start."""
     p = 2.0 * (q[2] * v[2] - q[3] * v[1])

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from dynresp.support.compiling import helper
 
 
-@njit
+@helper
 def multiply(a, b):
     """The rotation b followed by the rotation a."""
     return (
@@ -21,13 +21,13 @@ def multiply(a, b):
     )
 
 
-@njit
+@helper
 def from_to(a, b):
     """The rotation, in the world, that leads from orientation a to b."""
     return multiply(b, (a[0], -a[1], -a[2], -a[3]))
 
 
-@njit
+@helper
 def rotate(q, x, y, z):
     """A vector rotated."""
     p = 2.0 * (q[2] * z - q[3] * y)
@@ -40,13 +40,13 @@ def rotate(q, x, y, z):
     )
 
 
-@njit
+@helper
 def row(rows, k):
     """The quaternion in row k of (n, 4)."""
     return rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
 
 
-@njit
+@helper
 def to_vector(q):
     """Rotation vector [rad], the shorter way round."""
     sign = -1.0 if q[0] < 0.0 else 1.0
@@ -57,7 +57,7 @@ def to_vector(q):
     return scale * q[1], scale * q[2], scale * q[3]
 
 
-@njit
+@helper
 def from_vector(x, y, z):
     """Quaternion of a rotation vector [rad]."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -67,7 +67,7 @@ def from_vector(x, y, z):
     return math.cos(0.5 * angle), scale * x, scale * y, scale * z
 
 
-@njit
+@helper
 def yaw_of(q):
     """Facing [rad]: the twist about the vertical."""
     sign = -1.0 if q[0] < 0.0 else 1.0

@@ -117,7 +117,7 @@ def test_optional_packages_are_required_before_they_are_imported() -> None:
 
 def test_demo_without_optional_packages(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = ran(COMMAND, "demo", "--out", out, DYNRESP_MOTIONS="")
+    done = ran(COMMAND, "demo", "--video", "--out", out, DYNRESP_MOTIONS="")
     assert done.returncode == 0, done.stderr
     content = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert {path.name for path in out.iterdir()} == {"result.json", "motion.npz", "motion.bvh"}

@@ -10,9 +10,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 _PLAIN: dict[str, Any] = {"error_model": "numpy"}
 
@@ -88,7 +88,7 @@ _TREE = types.NamedTuple(
 )
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _put(outer, inner, out):
     """The placement `inner` followed by `outer`, (4,) each, as `placement.compose`."""
     cosine, sine = math.cos(outer[3]), math.sin(outer[3])

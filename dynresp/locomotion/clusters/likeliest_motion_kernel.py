@@ -10,10 +10,10 @@ import heapq
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from dynresp.locomotion.clusters.cluster_forest_kernel import EDGES, INTS, OFFSETS, REALS, TABLE
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 from dynresp.support.growing_kernel import doubled
 
 _PLAIN: dict[str, Any] = {"error_model": "numpy"}
@@ -71,7 +71,7 @@ _CLUSTERS = types.NamedTuple((INTS, REALS, INTS, INTS, INTS, TABLE), ClusterArra
 _INT, _REAL = types.int64, types.float64
 
 
-@njit(**_PLAIN)
+@helper(**_PLAIN)
 def _steps_left(incoming, clusters, path, depth):
     """Fewest steps from each state of a path to its last cluster; depth + 1 where there are none.
 
@@ -106,7 +106,7 @@ def _steps_left(incoming, clusters, path, depth):
     return left
 
 
-@njit(**_PLAIN)
+@helper(**_PLAIN)
 def _best_first(edges, clusters, path, root, steps_left, depth, bounded, max_cost):
     """The most probable motion along a path; within the depth only where `bounded`.
 

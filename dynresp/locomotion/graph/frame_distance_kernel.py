@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 from dynresp.support.growing_kernel import doubled
 
 LANES = 16
@@ -61,7 +61,7 @@ _SIGNATURE = types.Tuple((types.int64[::1], types.int32[::1], types.float32[::1]
 _FASTMATH = {"contract", "nnan", "nsz", "reassoc"}
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _half_squared(aw, ax, ay, az, bw, bx, by, bz):
     """Half the angle between two rotations, squared."""
     sign = _ONE if aw * bw + ax * bx + ay * by + az * bz >= _ZERO else -_ONE
@@ -70,7 +70,7 @@ def _half_squared(aw, ax, ay, az, bw, bx, by, bz):
     return u * (_G0 + u * (_G1 + u * (_G2 + u * (_G3 + u * (_G4 + u * (_G5 + u * _G6))))))
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _lower_bounds(bounds, own, start, count, sums):
     """Squared distances of bound vectors from one of them."""
     for d in range(0, BOUND_SIZE, 4):

@@ -9,9 +9,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
 _ROW = types.Array(types.float64, 1, "C", readonly=True)
@@ -90,7 +90,7 @@ _PLAY = types.void(
 )
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _turn(yaw, q, out):
     """A quaternion turned about the vertical."""
     c, s = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -101,7 +101,7 @@ def _turn(yaw, q, out):
     out[3] = c * z + s * w
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _turned_by(q, x, y, z, out):
     """The quaternion q times the rotation by |v| about v = (x, y, z)."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -117,7 +117,7 @@ def _turned_by(q, x, y, z, out):
     out[3] = a * z + b * y - c * x + d * w
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _turn_between(a, b, out):
     """Rotation vector of inverse(a) times b, the shorter way."""
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
@@ -131,7 +131,7 @@ def _turn_between(a, b, out):
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _move(place, dx, dy, dz, turn):
     """Move a placement (in place) by another, which is relative to it."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
@@ -142,7 +142,7 @@ def _move(place, dx, dy, dz, turn):
     place[3] = yaw - 2.0 * math.pi * math.ceil(yaw / (2.0 * math.pi) - 0.5)
 
 
-@njit
+@helper
 def _decay(offset, rate, age, blend_s, rate_s):
     """Decay a displacement and its rate (in place) to an age: cubics that end at rest.
 
@@ -162,7 +162,7 @@ def _decay(offset, rate, age, blend_s, rate_s):
         rate[i] = slope_of_offset * o + slope_of_rate * r
 
 
-@njit
+@helper
 def _put(pose, place, offset, out):
     """A recorded pose, placed and displaced."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
@@ -177,7 +177,7 @@ def _put(pose, place, offset, out):
         _turned_by(q, offset[at], offset[at + 1], offset[at + 2], q)
 
 
-@njit
+@helper
 def _jacobian(x, y, z, v, inverse, out):
     """The right Jacobian of rotations at a rotation vector o = (x, y, z), or its inverse, times v.
 
@@ -203,7 +203,7 @@ def _jacobian(x, y, z, v, inverse, out):
     out[2] = v[2] + first * c + second * (x * b - y * a)
 
 
-@njit
+@helper
 def _turned_back(x, y, z, v, out):
     """A vector v in the axes of a frame that is turned by a rotation vector (x, y, z)."""
     square = x * x + y * y + z * z
@@ -218,7 +218,7 @@ def _turned_back(x, y, z, v, out):
     out[2] = v[2] - first * c + second * (x * b - y * a)
 
 
-@njit
+@helper
 def _put_velocity(velocity, place, offset, rate, out):
     """The velocity of a recorded frame, placed and displaced."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])
@@ -234,7 +234,7 @@ def _put_velocity(velocity, place, offset, rate, out):
             out[at + i] += turning[i]
 
 
-@njit
+@helper
 def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
     """The displacement that turns a placed frame into a given pose with a given velocity."""
     cosine, sine = math.cos(place[3]), math.sin(place[3])

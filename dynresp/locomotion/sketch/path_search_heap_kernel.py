@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from dynresp.support.compiling import helper
 
 # Cells before their numbers begin anew.
 _WRAP = 1 << 14
 
 
-@njit
+@helper
 def sift_up(costs, ways, at):
     """Bring the last entry of a heap to its place; of equal costs the lower way comes first."""
     cost, way = costs[at], ways[at]
@@ -24,7 +25,7 @@ def sift_up(costs, ways, at):
     costs[at], ways[at] = cost, way
 
 
-@njit
+@helper
 def sift_down(costs, ways, size):
     """Bring the first entry of a heap to its place."""
     cost, way, at = costs[0], ways[0], 0
@@ -45,7 +46,7 @@ def sift_down(costs, ways, size):
     costs[at], ways[at] = cost, way
 
 
-@njit
+@helper
 def slot_of(keys, key):
     """Where a key is, or belongs, in a table with open addresses; -1 marks what is empty."""
     mask = len(keys) - 1
@@ -55,7 +56,7 @@ def slot_of(keys, key):
     return at
 
 
-@njit
+@helper
 def number(frame, x, y, yaw, done):
     """Cells as one number; far places may share it."""
     column = np.int64(math.floor(x)) & (_WRAP - 1)

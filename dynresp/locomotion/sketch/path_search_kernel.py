@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from dynresp.locomotion.playing.blending_kernel import (
     Blend,
@@ -36,7 +36,7 @@ from dynresp.locomotion.worlds.collision_kernel import (
 from dynresp.locomotion.worlds.footprint_kernel import BODY, footprint
 from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
 from dynresp.motion.kinematics_kernel import kinematics_kernel
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 from dynresp.support.growing_kernel import doubled
 
 (
@@ -63,7 +63,7 @@ _FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 _COSTS = types.Array(types.float32, 1, "C", readonly=True)
 
 
-@njit
+@helper
 def _play(entry, stop, state, planar, still, path, facing, settings):
     """Play frames entry to stop of a clip, and bring its state up to there.
 
@@ -98,7 +98,7 @@ def _play(entry, stop, state, planar, still, path, facing, settings):
     return -1, math.inf
 
 
-@njit
+@helper
 def _enter(state, placement):
     """Put the clip of a state where a way leads: its own placement, then the way's, in it."""
     cosine, sine = math.cos(state[YAW]), math.sin(state[YAW])
@@ -107,7 +107,7 @@ def _enter(state, placement):
     state[YAW] += placement[3]
 
 
-@njit
+@helper
 def _free(entry, stop, state, planar, feet, grid):
     """Whether no footprint of the frames entry to stop, as recorded, touches a box."""
     corner, clearance, starts, members, boxes = grid
@@ -124,7 +124,7 @@ def _free(entry, stop, state, planar, feet, grid):
     return True
 
 
-@njit
+@helper
 def _plays_free(left, entry, stop, move, motion, playing, body, grid, settings):
     """Play frames entry to stop after another; whether no pose of them touches a box.
 
@@ -167,7 +167,7 @@ def _plays_free(left, entry, stop, move, motion, playing, body, grid, settings):
     return True
 
 
-@njit
+@helper
 def _places(frame, state, planar, settings):
     """Two numbers for where a frame's root is: states at one place, and in one neighbourhood.
 

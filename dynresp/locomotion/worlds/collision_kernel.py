@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 REALS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
@@ -26,7 +26,7 @@ GRID = (REALS, CLEARANCE, LISTS, LISTS, ROWS)
 """Types of the arrays of a `CollisionGrid`: frame, clearance, starts, members and boxes."""
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _apart(x, y, cosine, sine, half_x, half_y, box):
     """Whether a line along a side separates two rectangles (the separating axis theorem)."""
     away_x, away_y = box[0] - x, box[1] - y
@@ -41,7 +41,7 @@ def _apart(x, y, cosine, sine, half_x, half_y, box):
     )
 
 
-@njit
+@helper
 def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, members, boxes):
     """Whether a footprint, widened by a margin on all sides, overlaps a box or leaves the grid.
 
@@ -80,7 +80,7 @@ def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, me
     return False
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _away(x, y, box):
     """Distance of a point to a box [m], negative inside."""
     x, y = x - box[0], y - box[1]

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from dynresp.motion.kinematics_kernel import kinematics_kernel
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 INTS = types.Array(types.int64, 1, "C", readonly=True)
@@ -23,7 +23,7 @@ SPHERE, CAPSULE, BOX = 2, 3, 6
 """MuJoCo's numbers of the shapes that a body may have."""
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _level(q, v):
     """Level part (x and y) of a vector that is rotated by a quaternion."""
     p = 2.0 * (q[2] * v[2] - q[3] * v[1])
@@ -32,7 +32,7 @@ def _level(q, v):
     return v[0] + q[0] * p + q[2] * r - q[3] * s, v[1] + q[0] * s + q[3] * p - q[1] * r
 
 
-@njit
+@helper
 def footprint(pose, positions, quaternions, body, out):
     """Write the footprint of one pose.
 

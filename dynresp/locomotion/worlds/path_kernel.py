@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from dynresp.support.compiling import helper
 
 # Squared distances [m^2] that differ by less are alike: there and back on one line.
 _ALIKE = 1e-9
 
 
-@njit
+@helper
 def nearest_on(path, x, y, progress, window):
     """The nearest point of a path, from what is done of it on; of equal ones the first.
 
@@ -50,7 +50,7 @@ def nearest_on(path, x, y, progress, window):
     return nearest, math.sqrt(least)
 
 
-@njit
+@helper
 def eq_8(path, x, y, cosine, sine, progress, target, away, ahead, facing, spacing):
     """Eq. 8 with the way left along the path in place of the straight distance [m].
 

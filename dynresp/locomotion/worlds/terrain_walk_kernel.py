@@ -15,11 +15,11 @@ import heapq
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.typed import Dict
 
 from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 from dynresp.support.growing_kernel import doubled
 
 (
@@ -51,7 +51,7 @@ _FEET = types.Tuple(
 )
 
 
-@njit
+@helper
 def _turned(a, b, turns):
     """The block (a, b) after quarter turns about the origin, a corner of blocks."""
     if turns == 0:
@@ -63,7 +63,7 @@ def _turned(a, b, turns):
     return b, -a - 1
 
 
-@njit
+@helper
 def _moved(place, move, out):
     """Put a clip where a way leads: its own placement, then the way's, in it."""
     a, b = move[0], move[1]
@@ -75,21 +75,21 @@ def _moved(place, move, out):
     out[LEFT], out[RIGHT] = place[LEFT], place[RIGHT]
 
 
-@njit
+@helper
 def _block(cells, frame, foot, place):
     """Column and row of the block on which a foot stands."""
     a, b = _turned(cells[frame, foot, 0], cells[frame, foot, 1], place[TURNS])
     return a + place[COLUMN], b + place[ROW]
 
 
-@njit
+@helper
 def _level_at(grid, a, b, otherwise):
     if 0 <= a < grid.shape[0] and 0 <= b < grid.shape[1]:
         return grid[a, b]
     return otherwise
 
 
-@njit
+@helper
 def _drawn(grid, a, b, over, turns):
     """How far a foot must be drawn in from edges of its block at which the height changes [m]."""
     here = grid[a, b]
@@ -109,7 +109,7 @@ def _drawn(grid, a, b, over, turns):
     return math.hypot(x, y)
 
 
-@njit
+@helper
 def _stand(grid, feet, entry, left, before, place, settings):
     """Go from a frame to the next.
 
@@ -154,7 +154,7 @@ def _stand(grid, feet, entry, left, before, place, settings):
     return cost
 
 
-@njit
+@helper
 def _root(planar, frame, place, block):
     """Where the root is: x, y and yaw."""
     x, y = planar[frame, 0], planar[frame, 1]
@@ -164,7 +164,7 @@ def _root(planar, frame, place, block):
     return x + block * place[COLUMN], y + block * place[ROW], yaw
 
 
-@njit
+@helper
 def _value(path, x, y, yaw, progress, away, settings):
     """Eq. 8 to the end of the path [m]."""
     return eq_8(
@@ -173,7 +173,7 @@ def _value(path, x, y, yaw, progress, away, settings):
     )  # fmt: skip
 
 
-@njit
+@helper
 def _key(frame, place):
     """One number for a frame and where on the grid its clip is put."""
     key = np.int64(frame) * 4 + place[TURNS]

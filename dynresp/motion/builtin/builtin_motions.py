@@ -79,7 +79,7 @@ def builtin_info(name: str) -> BuiltinInfo:
 
 
 def load_builtin(name: str, character: Character | None = None) -> Motion:
-    """Make a built-in motion; made once, then kept.
+    """Make a built-in motion; made once, then kept in memory and in the user's cache folder.
 
     Args:
         name: One of `builtin_names`.
@@ -166,4 +166,6 @@ def _spec(name: str) -> BuiltinSpec:
 
 @functools.lru_cache(maxsize=64)
 def _made(name: str, character: Character) -> Motion:
-    return make_motion(_spec(name), character)
+    from dynresp.motion.builtin.motion_cache import kept_motion
+
+    return kept_motion(_file_of(name), character, lambda: make_motion(_spec(name), character))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from dynresp.motion.feet.foot_fitting_place_kernel import (
     Correction,
@@ -31,14 +31,14 @@ from dynresp.motion.quaternion_kernel import (
     to_vector,
     yaw_of,
 )
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 _ROWS = types.float64[:, ::1]
 _NUMBERS = types.float64[::1]
 _FLAGS = types.boolean[::1]
 
 
-@njit
+@helper
 def _fading(value, slope, at, length):
     """The cubic from a value and its slope per frame to 0 and slope 0 in `length` frames."""
     if at >= length:
@@ -47,7 +47,7 @@ def _fading(value, slope, at, length):
     return (1.0 - u) ** 2 * (value * (1.0 + 2.0 * u) + slope * length * u)
 
 
-@njit
+@helper
 def _lowest(q, balls):
     """Height of the lowest of some balls (n, 4: centre, radius) of a foot above its ankle."""
     low = np.inf
@@ -57,19 +57,19 @@ def _lowest(q, balls):
     return low
 
 
-@njit
+@helper
 def _low(track, k, balls):
     """Height of the lowest of some balls of a foot above the ground at frame k."""
     return track.ankles[k, 2] + _lowest(row(track.feet, k), balls)
 
 
-@njit
+@helper
 def _corrected(played, turn, k):
     """Orientation of the corrected foot at frame k."""
     return multiply(from_vector(turn[k, 0], turn[k, 1], turn[k, 2]), row(played.feet, k))
 
 
-@njit
+@helper
 def _slide(before, after, x, y, sole, touch, shifts, touching):
     """How the sole's stillest point moves where the ankle moves by (x, y) over the ground.
 
@@ -94,7 +94,7 @@ def _slide(before, after, x, y, sole, touch, shifts, touching):
     return least_slide(shifts, touching)
 
 
-@njit
+@helper
 def _facing(start, window_stop, last, played, source, weight, turn, max_turn):
     """How far a stance that begins is turned about the vertical from the source [rad]."""
     sine = cosine = 0.0
@@ -110,7 +110,7 @@ def _facing(start, window_stop, last, played, source, weight, turn, max_turn):
     return min(max(yaw, own + turn[last, 2] - most), own + turn[last, 2] + most)
 
 
-@njit
+@helper
 def _misfit(k, played, source, jump, correction, sole):
     """How a standing foot differs from the source at frame k, if it moves on as played there.
 
@@ -139,7 +139,7 @@ def _misfit(k, played, source, jump, correction, sole):
     return yaw, (tilt_x, tilt_y, slope_x, slope_y), (rise, slope)
 
 
-@njit
+@helper
 def _stand(stance, hurry, yaw, played, source, demands, shape, blend, correction):
     """Write how the foot is turned, and how high it is, in a stance.
 
@@ -178,7 +178,7 @@ def _stand(stance, hurry, yaw, played, source, demands, shape, blend, correction
         shift[k, 2] = z - played.ankles[k, 2]
 
 
-@njit
+@helper
 def _hold(stance, played, source, demands, sole, still, touch, correction):
     """Write where the foot is on the ground in a stance, so that it does not slide.
 
@@ -225,7 +225,7 @@ def _hold(stance, played, source, demands, sole, still, touch, correction):
         shift[k, 1] = shift[k - 1, 1] + y - off[1] + left * slip_y - own_y
 
 
-@njit
+@helper
 def _restrain(stance, max_distance, shift):
     """Let a foot slide that would be held too far from where it is played."""
     start, stop, goes_on = stance
@@ -237,7 +237,7 @@ def _restrain(stance, max_distance, shift):
         shift[k, 1] *= part
 
 
-@njit
+@helper
 def _swing(last, following, known, ease, values):
     """Ease a correction (n, 3) from one frame where it is known to the next.
 

@@ -10,7 +10,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+
+from dynresp.support.compiling import helper
 
 # A position within reach is searched in so many steps, and to within so much [m].
 _STEPS = 64
@@ -108,7 +109,7 @@ class Correction(NamedTuple):
     turn: Any
 
 
-@njit
+@helper
 def into_discs(x, y, discs):
     """Move a point into discs, or to where it is least far outside if they share no point.
 
@@ -137,7 +138,7 @@ def into_discs(x, y, discs):
     return x, y, False
 
 
-@njit
+@helper
 def _discs(start, stop, played, shift, leg, drop, max_distance, discs):
     """Write discs (2 (stop - start), 3) in which a stance may be put: the leg then reaches it.
 
@@ -154,7 +155,7 @@ def _discs(start, stop, played, shift, leg, drop, max_distance, discs):
         discs[at + 1, 2] = max_distance
 
 
-@njit
+@helper
 def _near(x, y, start, last, most, shift):
     """A point moved so near to the last stance that a correction changes by `most` a frame."""
     if last < 0:
@@ -164,7 +165,7 @@ def _near(x, y, start, last, most, shift):
     return shift[last, 0] + part * off_x, shift[last, 1] + part * off_y
 
 
-@njit
+@helper
 def put(start, stop, window_stop, last, weight, played, leg, limits, shift):
     """Shift a stance that begins to where it differs least from what is played, within reach.
 

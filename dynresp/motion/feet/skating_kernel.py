@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 _CORNERS = types.Array(types.float64, 3, "C", readonly=True)
 
 
-@njit
+@helper
 def least_slide(shifts, touching):
     """How the sole's stillest point moves over the ground.
 

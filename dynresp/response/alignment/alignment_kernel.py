@@ -18,9 +18,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 # Floats in one vector instruction: `LANES` of `dynresp.response.windows.windows`.
 LANES = 8
@@ -72,7 +72,7 @@ _PLAIN: dict[str, Any] = {"error_model": "numpy"}
 _FAST: dict[str, Any] = {**_PLAIN, "fastmath": {"contract", "nnan", "nsz", "reassoc"}}
 
 
-@njit(forceinline=True, **_FAST)
+@helper(forceinline=True, **_FAST)
 def _heading(track, row, at, share, bodies):
     """Ground point and half yaw of the pelvis at a window's first frame, and their rates."""
     end = at + bodies
@@ -89,7 +89,7 @@ def _heading(track, row, at, share, bodies):
     return x + share * dx, y + share * dy, w / size, k / size, dx, dy, yaw_rate
 
 
-@njit(forceinline=True, **_FAST)
+@helper(forceinline=True, **_FAST)
 def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp, wt):
     """Error of two windows [m] and its slopes along the first frame of either [m/frame].
 
@@ -159,7 +159,7 @@ def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp,
     return total, along_a, along_b
 
 
-@njit(**_FAST)
+@helper(**_FAST)
 def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):
     """Error alone; what the slopes cost falls away when this is compiled."""
     s, m = int(exit_at), int(entry_at)
@@ -167,7 +167,7 @@ def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):
     return found[0]
 
 
-@njit(**_FAST)
+@helper(**_FAST)
 def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):
     """Error and slopes; at the upper ends of the box, the slopes from below."""
     s, m = int(exit_at), int(entry_at)
@@ -222,13 +222,13 @@ def lay_out(positions, quaternions, frames, rows):
     return True
 
 
-@njit(**_PLAIN)
+@helper(**_PLAIN)
 def _free(at, low, high, slope):
     """Whether going down the slope stays between the bounds."""
     return not ((at <= low and slope >= 0.0) or (at >= high and slope <= 0.0))
 
 
-@njit(**_PLAIN)
+@helper(**_PLAIN)
 def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step, most, gain):
     """BFGS from a sample, projected on the box: error, exit, entry and evaluations."""
     f, gs, gm = _slope(a, a_row, s, last, b, b_row, m, latest, bodies, wp, wt)
@@ -281,6 +281,17 @@ def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step
         if small:
             break
     return f, s, m, evaluations
+
+
+@helper(**_PLAIN)
+def _lowest(errors, sets, entries):
+    """The lowest error of the first sets, infinity where all are, and where it is."""
+    lowest, s, e = np.float32(np.inf), 0, 0
+    for i in range(sets):
+        for j in range(entries):
+            if errors[i, j] < lowest:
+                lowest, s, e = errors[i, j], i, j
+    return lowest, s, e
 
 
 @compiled(_ALIGN, **_PLAIN)
@@ -345,12 +356,13 @@ def align_kernel(
             out[SETS] = tried
             out[COMPLETE] = tried == len(exits) or without >= patience
             for _ in range(starts):
-                s, e = divmod(errors[:tried].argmin(), entries)
-                lowest = errors[s, e]
+                lowest, s, e = _lowest(errors, tried, entries)
                 if lowest == np.inf:
                     break
                 # Its neighbours belong to the same valley.
-                errors[max(s - 1, 0) : s + 2, max(e - 1, 0) : e + 2] = np.inf
+                for i in range(max(s - 1, 0), min(s + 2, sets)):
+                    for j in range(max(e - 1, 0), min(e + 2, entries)):
+                        errors[i, j] = np.inf
                 if lowest < out[ERROR]:
                     out[REFINED] = 0.0
                     out[ERROR], out[EXIT], out[ENTRY] = lowest, exits[s], e * apart + place[2]
@@ -374,7 +386,10 @@ def errors_kernel(positions, quaternions, clips, place, wp, wt, frames, exits, e
     False if the trace is not finite or not of unit length as far as it is needed.
     """
     bodies = positions.shape[1]
-    used = math.ceil(exits.max()) + frames
+    latest = 0.0
+    for exit_at in exits:
+        latest = max(latest, exit_at)
+    used = math.ceil(latest) + frames
     a_row = (used + 1) * bodies + LANES
     a = np.empty(ROWS * a_row, np.float32)
     if not lay_out(positions, quaternions, used, a):

@@ -140,7 +140,7 @@ class PairwiseQuadratic:
 
         rows = self._rows(features)
         decisions = np.empty((len(rows), len(self.weights)), dtype=self.weights.dtype)
-        bad = prediction_kernel.decision_kernel(
+        bad = prediction_kernel.decision_kernels[self._padded.dtype](
             rows, self.projection, self.offset, self._padded, decisions
         )
         self._refuse(bad)
@@ -166,7 +166,7 @@ class PairwiseQuadratic:
 
         decisions = self.pair_decisions(features)
         scores = np.empty((len(decisions), self.classes))
-        prediction_kernel.score_kernel(self.classes, decisions, scores)
+        prediction_kernel.score_kernels[decisions.dtype](self.classes, decisions, scores)
         return scores
 
     def rank(self, features: npt.ArrayLike, best: int = 1) -> npt.NDArray[np.int64]:
@@ -198,7 +198,7 @@ class PairwiseQuadratic:
 
         rows = self._rows(features)
         ranks = np.empty((len(rows), best), dtype=np.int64)
-        bad = prediction_kernel.rank_kernel(
+        bad = prediction_kernel.rank_kernels[self._padded.dtype](
             rows, self.projection, self.offset, self._padded, self.classes, ranks
         )
         self._refuse(bad)

@@ -16,9 +16,9 @@ places are found likewise among the rest, with what is already known.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 LANES = 64
 """Rows of weights are padded with zeros to a multiple of this, so that loops have no remainder."""
@@ -36,7 +36,7 @@ _SINGLE = types.Array(types.float32, 2, "C", readonly=True)
 _VECTOR = types.Array(types.float64, 1, "C", readonly=True)
 
 
-@njit(fastmath=_FASTMATH)
+@helper(fastmath=_FASTMATH)
 def _project(features, projection, offset, reduced):
     """Principal components of some rows; index of the first row out of range, -1 if none is.
 
@@ -55,7 +55,7 @@ def _project(features, projection, offset, reduced):
     return bad if bad < len(features) else -1
 
 
-@njit
+@helper
 def _expand(reduced, monomials):
     """Monomials of the principal components of one row, without the padding."""
     components = len(reduced)
@@ -71,14 +71,14 @@ def _expand(reduced, monomials):
         at += components - c
 
 
-@njit
+@helper
 def _pair(first, second, classes):
     """Place of the pair of two classes, in either order, among all pairs."""
     low, high = min(first, second), max(first, second)
     return low * (2 * classes - low - 1) // 2 + high - low - 1
 
 
-@njit
+@helper
 def _score(c, classes, decisions):
     """Votes and bounded confidence of one class, added in scikit-learn's order."""
     votes, confidence = 0.0, 0.0
@@ -91,7 +91,7 @@ def _score(c, classes, decisions):
     return votes + confidence / (3.0 * (abs(confidence) + 1.0))
 
 
-@njit(fastmath=_FASTMATH)
+@helper(fastmath=_FASTMATH)
 def _next_best(classes, weights, monomials, decisions, known, losses, scored, placed, scores):
     """The class of the highest score among those not placed; evaluates what that takes."""
     best = -1
@@ -144,7 +144,7 @@ def _next_best(classes, weights, monomials, decisions, known, losses, scored, pl
             best = leader
 
 
-@njit(fastmath=_FASTMATH)
+@helper(fastmath=_FASTMATH)
 def _all_pairs(weights, monomials, decisions):
     """Decisions of all pairs for some rows; each row of weights is read once."""
     for pair in range(len(weights)):
@@ -155,13 +155,7 @@ def _all_pairs(weights, monomials, decisions):
             decisions[n, pair] = total
 
 
-@compiled(
-    [
-        types.int64(_ROWS, _ROWS, _VECTOR, weights, types.int64, types.int64[:, ::1])
-        for weights in (_ROWS, _SINGLE)
-    ]
-)
-def rank_kernel(features, projection, offset, weights, classes, ranks):
+def _rank(features, projection, offset, weights, classes, ranks):
     """Find the best classes of every row, evaluating only pairs that can matter.
 
     Args:
@@ -204,17 +198,11 @@ def rank_kernel(features, projection, offset, weights, classes, ranks):
     return -1
 
 
-@compiled(
-    [
-        types.int64(_ROWS, _ROWS, _VECTOR, weights, types.Array(scalar, 2, "C"))
-        for weights, scalar in ((_ROWS, types.float64), (_SINGLE, types.float32))
-    ]
-)
-def decision_kernel(features, projection, offset, weights, decisions):
+def _decide(features, projection, offset, weights, decisions):
     """Evaluate all pairs of every row.
 
     Args:
-        features: As for `rank_kernel`, and so are `projection`, `offset` and `weights`.
+        features: As for `_rank`, and so are `projection`, `offset` and `weights`.
         projection: See there.
         offset: See there.
         weights: See there.
@@ -236,13 +224,7 @@ def decision_kernel(features, projection, offset, weights, decisions):
     return -1
 
 
-@compiled(
-    [
-        types.void(types.int64, types.Array(scalar, 2, "C"), types.float64[:, ::1])
-        for scalar in (types.float64, types.float32)
-    ]
-)
-def score_kernel(classes, decisions, scores):
+def _count(classes, decisions, scores):
     """Scores of all classes of every row, as scikit-learn's `decision_function` has them.
 
     Args:
@@ -253,3 +235,31 @@ def score_kernel(classes, decisions, scores):
     for n in range(len(decisions)):
         for c in range(classes):
             scores[n, c] = _score(c, classes, decisions[n])
+
+
+_PRECISIONS = (
+    (np.dtype(np.float64), _ROWS, types.float64),
+    (np.dtype(np.float32), _SINGLE, types.float32),
+)
+# One kernel for each precision of the weights, so that a program compiles the one that it uses.
+rank_kernels = {
+    dtype: compiled(types.int64(_ROWS, _ROWS, _VECTOR, weights, types.int64, types.int64[:, ::1]))(
+        _rank
+    )
+    for dtype, weights, _ in _PRECISIONS
+}
+"""See `_rank`, by the precision of `weights`."""
+decision_kernels = {
+    dtype: compiled(types.int64(_ROWS, _ROWS, _VECTOR, weights, types.Array(scalar, 2, "C")))(
+        _decide
+    )
+    for dtype, weights, scalar in _PRECISIONS
+}
+"""See `_decide`, by the precision of `weights`."""
+score_kernels = {
+    dtype: compiled(types.void(types.int64, types.Array(scalar, 2, "C"), types.float64[:, ::1]))(
+        _count
+    )
+    for dtype, _, scalar in _PRECISIONS
+}
+"""See `_count`, by the precision of `decisions`."""

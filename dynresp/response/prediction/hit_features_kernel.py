@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.motion.quaternion_kernel import multiply, rotate, row
+from dynresp.support.compiling import compiled, helper
 
 _REALS = types.Array(types.float64, 1, "C", readonly=True)
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
@@ -26,34 +27,12 @@ _SIGNATURE = types.void(
 _SMALL = 5e-7
 
 
-@njit(inline="always")
-def _multiply(a, b, out):
-    """Hamilton product a b of quaternions w x y z."""
-    w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
-    x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
-    y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
-    z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
-    out[0], out[1], out[2], out[3] = w, x, y, z
-
-
-@njit(inline="always")
-def _rotate(q, v, out):
-    """A vector turned by a quaternion."""
-    p = 2.0 * (q[2] * v[2] - q[3] * v[1])
-    s = 2.0 * (q[3] * v[0] - q[1] * v[2])
-    r = 2.0 * (q[1] * v[1] - q[2] * v[0])
-    x = v[0] + q[0] * p + q[2] * r - q[3] * s
-    y = v[1] + q[0] * s + q[3] * p - q[1] * r
-    z = v[2] + q[0] * r + q[1] * s - q[2] * p
-    out[0], out[1], out[2] = x, y, z
-
-
-@njit(inline="always")
-def _write(cosine, sine, v, out, at):
+@helper
+def _write(cosine, sine, vector, features, hit, at):
     """A vector as seen from the facing at contact."""
-    out[at] = cosine * v[0] + sine * v[1]
-    out[at + 1] = cosine * v[1] - sine * v[0]
-    out[at + 2] = v[2]
+    features[hit, at] = cosine * vector[0] + sine * vector[1]
+    features[hit, at + 1] = cosine * vector[1] - sine * vector[0]
+    features[hit, at + 2] = vector[2]
 
 
 @compiled(_SIGNATURE)
@@ -75,61 +54,97 @@ def features_kernel(poses, velocities, frames, parents, offsets, centers, shares
     turn, place = np.empty((bodies, 4)), np.empty((bodies, 3))
     rate, speed = np.empty((bodies, 3)), np.empty((bodies, 3))
     middle, moved = np.empty((bodies, 3)), np.empty((bodies, 3))
-    arm, seen, facing = np.empty(3), np.empty(4), np.zeros(4)
     whole, drift = np.empty(3), np.empty(3)
     for hit in range(len(poses)):
-        first = poses[hit, 0]
         # The twist of the pelvis about the vertical, see `rotations.yaw_of`.
-        yaw = 2.0 * math.atan2(-first[6] if first[3] < 0.0 else first[6], abs(first[3]))
+        w, z = poses[hit, 0, 3], poses[hit, 0, 6]
+        yaw = 2.0 * math.atan2(-z if w < 0.0 else z, abs(w))
         cosine, sine = math.cos(yaw), math.sin(yaw)
-        facing[0], facing[3] = math.cos(0.5 * yaw), -math.sin(0.5 * yaw)
+        facing = (math.cos(0.5 * yaw), 0.0, 0.0, -math.sin(0.5 * yaw))
         for k in range(len(frames)):
-            pose, qvel = poses[hit, frames[k]], velocities[hit, frames[k]]
-            whole[:] = 0.0
-            drift[:] = 0.0
+            frame = frames[k]
+            for axis in range(3):
+                whole[axis] = drift[axis] = 0.0
             for body in range(bodies):
-                own = pose[3 + 4 * body : 7 + 4 * body]
-                parent = parents[body]
+                parent, at = parents[body], 3 + 4 * body
+                own = (
+                    poses[hit, frame, at], poses[hit, frame, at + 1],
+                    poses[hit, frame, at + 2], poses[hit, frame, at + 3],
+                )  # fmt: skip
+                if parent >= 0:
+                    own = multiply(row(turn, parent), own)
+                turn[body, 0], turn[body, 1], turn[body, 2], turn[body, 3] = own
+                at = 3 + 3 * body
+                rate[body, 0], rate[body, 1], rate[body, 2] = rotate(
+                    own, velocities[hit, frame, at], velocities[hit, frame, at + 1],
+                    velocities[hit, frame, at + 2],
+                )  # fmt: skip
                 if parent < 0:
-                    turn[body] = own
                     for axis in range(3):
-                        place[body, axis] = pose[axis] - (first[axis] if axis < 2 else 0.0)
-                        speed[body, axis] = qvel[axis]
-                    _rotate(turn[body], qvel[3 + 3 * body : 6 + 3 * body], rate[body])
+                        start = poses[hit, 0, axis] if axis < 2 else 0.0
+                        place[body, axis] = poses[hit, frame, axis] - start
+                        speed[body, axis] = velocities[hit, frame, axis]
                 else:
-                    _multiply(turn[parent], own, turn[body])
-                    _rotate(turn[parent], offsets[body], arm)
-                    _rotate(turn[body], qvel[3 + 3 * body : 6 + 3 * body], rate[body])
-                    about = rate[parent]
-                    for axis in range(3):
-                        after, last = (axis + 1) % 3, (axis + 2) % 3
-                        place[body, axis] = place[parent, axis] + arm[axis]
-                        rate[body, axis] += about[axis]
-                        across = about[after] * arm[last] - about[last] * arm[after]
-                        speed[body, axis] = speed[parent, axis] + across
-                _rotate(turn[body], centers[body], arm)
-                about = rate[body]
+                    x, y, z = rotate(
+                        row(turn, parent), offsets[body, 0], offsets[body, 1], offsets[body, 2]
+                    )
+                    a, b, c = rate[parent, 0], rate[parent, 1], rate[parent, 2]
+                    place[body, 0] = place[parent, 0] + x
+                    place[body, 1] = place[parent, 1] + y
+                    place[body, 2] = place[parent, 2] + z
+                    rate[body, 0] += a
+                    rate[body, 1] += b
+                    rate[body, 2] += c
+                    speed[body, 0] = speed[parent, 0] + (b * z - c * y)
+                    speed[body, 1] = speed[parent, 1] + (c * x - a * z)
+                    speed[body, 2] = speed[parent, 2] + (a * y - b * x)
+                x, y, z = rotate(own, centers[body, 0], centers[body, 1], centers[body, 2])
+                a, b, c = rate[body, 0], rate[body, 1], rate[body, 2]
+                middle[body, 0] = place[body, 0] + x
+                middle[body, 1] = place[body, 1] + y
+                middle[body, 2] = place[body, 2] + z
+                moved[body, 0] = speed[body, 0] + (b * z - c * y)
+                moved[body, 1] = speed[body, 1] + (c * x - a * z)
+                moved[body, 2] = speed[body, 2] + (a * y - b * x)
                 for axis in range(3):
-                    after, last = (axis + 1) % 3, (axis + 2) % 3
-                    across = about[after] * arm[last] - about[last] * arm[after]
-                    middle[body, axis] = place[body, axis] + arm[axis]
-                    moved[body, axis] = speed[body, axis] + across
                     whole[axis] += shares[body] * middle[body, axis]
                     drift[axis] += shares[body] * moved[body, axis]
-            row, at = features[hit], k * width
+            at = k * width
             for which in range(len(chosen)):
                 body = chosen[which]
-                _write(cosine, sine, middle[body], row, at)
-                _multiply(facing, turn[body], seen)
+                _write(
+                    cosine,
+                    sine,
+                    (middle[body, 0], middle[body, 1], middle[body, 2]),
+                    features,
+                    hit,
+                    at,
+                )
+                seen = multiply(facing, row(turn, body))
                 sign = -1.0 if seen[0] < 0.0 else 1.0
                 length = math.sqrt(seen[1] ** 2 + seen[2] ** 2 + seen[3] ** 2)
                 scale = 2.0 * sign
                 if length >= _SMALL:
                     scale *= math.atan2(length, sign * seen[0]) / length
-                for axis in range(3):
-                    row[at + 3 + axis] = scale * seen[1 + axis]
-                _write(cosine, sine, moved[body], row, at + 6)
-                _write(cosine, sine, rate[body], row, at + 9)
+                features[hit, at + 3] = scale * seen[1]
+                features[hit, at + 4] = scale * seen[2]
+                features[hit, at + 5] = scale * seen[3]
+                _write(
+                    cosine,
+                    sine,
+                    (moved[body, 0], moved[body, 1], moved[body, 2]),
+                    features,
+                    hit,
+                    at + 6,
+                )
+                _write(
+                    cosine,
+                    sine,
+                    (rate[body, 0], rate[body, 1], rate[body, 2]),
+                    features,
+                    hit,
+                    at + 9,
+                )
                 at += 12
-            _write(cosine, sine, whole, row, at)
-            _write(cosine, sine, drift, row, at + 3)
+            _write(cosine, sine, (whole[0], whole[1], whole[2]), features, hit, at)
+            _write(cosine, sine, (drift[0], drift[1], drift[2]), features, hit, at + 3)

@@ -19,9 +19,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
-from dynresp.support.compiling import compiled
+from dynresp.support.compiling import compiled, helper
 
 # Q(u) = 4 asin(sqrt(u) / 2) / sqrt(u) on 0 <= u <= 2 (rotations up to 180 degrees): weighted least
 # squares driven to the smallest largest relative error, 5.8e-6. Two more terms would bring 1.8e-7
@@ -60,7 +60,7 @@ _SIGNATURE = types.void(
 _FASTMATH = {"contract", "nnan", "nsz"}
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
     """Weighted difference of two states of a body."""
     x, y, z = ax - bx, ay - by, az - bz

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from numba import njit
 
 from dynresp.locomotion.worlds.path_kernel import nearest_on
 from dynresp.locomotion.worlds.paths import (
@@ -11,6 +12,8 @@ from dynresp.locomotion.worlds.paths import (
     window_m,
 )
 from dynresp.support.errors import UsageError
+
+_nearest_on = njit(lambda path, x, y, done, window: nearest_on(path, x, y, done, window))
 
 
 def test_distances_to_a_path() -> None:
@@ -43,21 +46,21 @@ def test_what_is_done_of_a_path_never_becomes_less() -> None:
     path = resampled([(0.0, 0.0), (2.0, 0.0), (0.0, 0.0), (2.0, 0.0)], 0.1)
     done, told = 0.0, []
     for x in [*np.arange(0.0, 2.0, 0.07), *np.arange(2.0, 0.0, -0.07), *np.arange(0.0, 2.0, 0.07)]:
-        done, away = nearest_on(path, x, 0.0, done, 4)
+        done, away = _nearest_on(path, x, 0.0, done, 4)
         assert away < 0.07
         told.append(done)
     assert (np.diff(told) >= 0.0).all()
     assert told[-1] == pytest.approx(59.5, abs=0.6)
     # Who stands still stays where he is, and who goes back is as far away as he has gone.
-    assert nearest_on(path, 1.0, 0.0, 10.0, 4) == (10.0, 0.0)
-    assert nearest_on(path, 0.5, 0.0, 10.0, 4) == pytest.approx((10.0, 0.5))
+    assert _nearest_on(path, 1.0, 0.0, 10.0, 4) == (10.0, 0.0)
+    assert _nearest_on(path, 0.5, 0.0, 10.0, 4) == pytest.approx((10.0, 0.5))
 
 
 def test_the_nearest_point_of_a_path_is_looked_for_ahead(rng: np.random.Generator) -> None:
     path = np.cumsum(rng.normal(0.0, 0.1, (30, 2)), axis=0)
     for _ in range(200):
         point, done = rng.normal(0.0, 0.4, 2), rng.uniform(0.0, 29.0)
-        found, away = nearest_on(path, *point, done, 4)
+        found, away = _nearest_on(path, *point, done, 4)
         at = np.linspace(done, min(int(done) + 4, 29), 2001)
         places = np.stack([np.interp(at, np.arange(30), path[:, k]) for k in range(2)], axis=1)
         assert done <= found <= at[-1] + 1e-9
@@ -65,8 +68,8 @@ def test_the_nearest_point_of_a_path_is_looked_for_ahead(rng: np.random.Generato
 
 
 def test_a_path_of_one_point_and_points_that_are_alike() -> None:
-    assert nearest_on(np.array([(1.0, 1.0)]), 1.0, 3.0, 0.0, 4) == (0.0, 2.0)
-    assert nearest_on(np.array([(1.0, 1.0), (1.0, 1.0)]), 1.0, 3.0, 0.0, 4) == (1.0, 2.0)
+    assert _nearest_on(np.array([(1.0, 1.0)]), 1.0, 3.0, 0.0, 4) == (0.0, 2.0)
+    assert _nearest_on(np.array([(1.0, 1.0), (1.0, 1.0)]), 1.0, 3.0, 0.0, 4) == (1.0, 2.0)
 
 
 def test_at_low_rates_one_looks_farther_ahead() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 from dynresp.motion import rotations
 from dynresp.motion.character import Character, default_character
@@ -36,6 +37,8 @@ from tests.motion.foot_samples import (
 )
 from tests.oracles import foot_fitting
 from tests.physics.samples import standing
+
+_into_discs = njit(lambda x, y, discs: into_discs(x, y, discs))
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -173,7 +176,7 @@ class TestDiscs:
         centres = along * rng.normal(scale=0.25, size=2) + rng.normal(scale=0.02, size=(count, 2))
         discs = np.column_stack([centres, rng.uniform(0.05, 0.5) + 0.02 * along])
         start = rng.normal(scale=0.2, size=2)
-        x, y, inside = into_discs(*start, discs)
+        x, y, inside = _into_discs(*start, discs)
         best = foot_fitting.least_outside(discs)
         out = foot_fitting.outside((x, y), discs)
         assert inside == (out <= 1e-4)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character, default_character
@@ -17,6 +18,8 @@ from dynresp.motion.rotations import FloatArray
 from tests.motion.samples import smooth_motion
 from tests.oracles import foot_fitting, kinematics
 from tests.physics.samples import turned
+
+_least_slide = njit(lambda ways, touching: least_slide(ways, touching))
 
 FPS = 30.0
 seeds = st.integers(0, 2**32 - 1)
@@ -121,13 +124,13 @@ class TestTwins:
         ways = rng.normal(size=(4, 2)) + rng.normal(size=2)
         touching = np.zeros(4, dtype=bool)
         touching[rng.permutation(4)[:corners]] = True
-        found = np.array(least_slide(ways, touching))
+        found = np.array(_least_slide(ways, touching))
         twin = foot_fitting.stillest_way(ways[touching])
         np.testing.assert_allclose(np.linalg.norm(found), np.linalg.norm(twin), atol=1e-6)
 
     def test_equal_ways_have_that_way(self) -> None:
         ways = np.tile([0.3, -0.4], (4, 1))
-        assert least_slide(ways, np.ones(4, dtype=bool)) == pytest.approx((0.3, -0.4))
+        assert _least_slide(ways, np.ones(4, dtype=bool)) == pytest.approx((0.3, -0.4))
 
     @given(seed=seeds)
     def test_feet_anyhow(self, seed: int) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 from dynresp.bench import alignment_speed as bench
 from dynresp.response.alignment.alignment import Aligner, AlignmentConfig
@@ -104,11 +105,12 @@ def test_slopes_are_those_of_the_twin(seed: int) -> None:
     assert kernel.lay_out(*trace, FRAMES, rows)
     _, clip_row, _, latest = aligner._places[0].tolist()
     rng = np.random.default_rng(seed)
+    slope = njit(lambda *arguments: kernel._slope(*arguments))
     for _ in range(4):
         # Between whole frames, where the slope has a step.
         at = rng.integers(2, 12) + rng.uniform(0.1, 0.9)
         entry = rng.integers(0, 19) + rng.uniform(0.1, 0.9)
-        found = kernel._slope(
+        found = slope(
             rows, row, at, 12.0, aligner._clips, clip_row, entry, latest, BODIES, *aligner._weights
         )
         step = 1e-4
