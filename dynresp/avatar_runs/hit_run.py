@@ -23,7 +23,7 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.physics.impacts import Ball
 from dynresp.response.chooser import ChoiceTable, make_chooser
 from dynresp.response.response import CARRY_ON, ResponseConfig
-from dynresp.response.runtime.dynamic_responder import Event, EventKind, Flight, Phase
+from dynresp.response.runtime.dynamic_responder import Event, EventKind, Phase, SimulatedHit
 from dynresp.support.progress import Progress, no_progress
 from dynresp.view.story import MovingSphere, PhaseName, StoryEvent, StoryPhase
 
@@ -149,7 +149,7 @@ class _Recorder:
         self._drivers: list[PhaseName] = []
         self._parts: list[str] = []
         self._standing: list[npt.NDArray[np.bool_] | None] = []
-        self._flights: list[Flight] = []
+        self._hits: list[SimulatedHit] = []
         self._last: Event | None = None
 
     def record(self) -> None:
@@ -164,9 +164,9 @@ class _Recorder:
                 self.events.append(
                     StoryEvent(_NAMES[event.kind], max(event.frame - 1, 0) / self._fps)
                 )
-        flight = responder.flight
-        if flight is not None and (not self._flights or self._flights[-1] is not flight):
-            self._flights.append(flight)
+        hit = responder.last_hit
+        if hit is not None and (not self._hits or self._hits[-1] is not hit):
+            self._hits.append(hit)
         self._drivers.append(self._name_of_phase())
         standing = self._avatar.standing
         self._standing.append(standing)
@@ -211,15 +211,15 @@ class _Recorder:
     def spheres(self) -> list[MovingSphere]:
         """The balls, from launch to the end of their simulation."""
         balls = []
-        for number, flight in enumerate(self._flights, 1):
-            if flight.trace is None or flight.trace.impactor is None:
+        for number, hit in enumerate(self._hits, 1):
+            if hit.trace is None or hit.trace.impactor is None:
                 continue
             track = np.full((len(self.poses), 3), np.nan)
-            positions = flight.trace.impactor[:, :3]
-            first = flight.launch - 1
+            positions = hit.trace.impactor[:, :3]
+            first = hit.start - 1
             stop = min(first + len(positions), len(track))
             track[max(first, 0) : stop] = positions[max(-first, 0) : stop - first]
-            balls.append(MovingSphere(f"ball {number}", flight.setup.impact.radius, track))
+            balls.append(MovingSphere(f"ball {number}", hit.setup.impact.radius, track))
         return balls
 
     def _name_of_phase(self) -> PhaseName:

@@ -89,9 +89,9 @@ def test_memory_and_the_cost_of_a_hit_do_not_grow_with_what_was_played(
         hit = functools.partial(responder.hit, Ball(0.3, speed=10.0, offset=4.0))
         taken.append(_memory_of(hit))
         _until(crowd, Phase.APPROACH)
-        assert responder.flight is not None
-        assert len(responder.flight.base) < 200
-        assert len(responder._plan.stretches) < 10
+        assert responder.last_hit is not None
+        assert len(responder.last_hit.base) < 200
+        assert len(responder._timeline.pieces) < 10
     assert max(taken[-10:]) < 1.5 * max(taken[5:15])
 
 
@@ -119,8 +119,8 @@ def test_what_is_asked_for_during_the_approach_is_played_after_a_miss(
     turned = walking(character, 6.0, yaw=0.3)
     turned = turned.moved(0.0, base.poses[first, ROOT] - turned.poses[first, ROOT])
     responder.play(turned.slice(first, len(turned)), first)
-    assert responder.flight is not None
-    np.testing.assert_allclose(responder.flight.base.poses[4], turned.poses[first], atol=1e-12)
+    assert responder.last_hit is not None
+    np.testing.assert_allclose(responder.last_hit.base.poses[4], turned.poses[first], atol=1e-12)
     for _ in range(40):
         crowd.advance()
     assert EventKind.MISSED in [event.kind for event in responder.events]

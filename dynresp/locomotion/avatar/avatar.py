@@ -225,10 +225,10 @@ class Avatar:
     def _return_to_graph(self) -> None:
         """Decide when and where the reaction enters the graph, or that the avatar stays."""
         responder, fps = self.responder, self.responder.physics.fps
-        flight, first = responder.flight, responder.free_from
-        assert flight is not None
+        hit, first = responder.last_hit, responder.free_from
+        assert hit is not None
         assert first is not None
-        begin = max(flight.exit, first - round(fps))
+        begin = max(hit.exit, first - round(fps))
         stop = max(responder.planned_until, first + 1)
         poses = responder.planned(begin, stop + 1 - begin)
         velocities = pose_velocities(poses, fps)
@@ -238,7 +238,7 @@ class Avatar:
         entry = self._reentry.find(
             poses[moments], velocities[moments], contacts[moments], moments / fps
         )
-        reaction = flight.choice.name if flight.choice is not None else "nothing"
+        reaction = hit.choice.name if hit.choice is not None else "nothing"
         if entry is None:
             self.returns.append(GraphReturn(responder.frame, None, None, reaction))
             self._stream, self.activity = None, Activity.STAYING

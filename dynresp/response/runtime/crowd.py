@@ -1,4 +1,4 @@
-"""Characters at run time, advanced together frame by frame; their simulations share batches."""
+"""`Crowd`: characters at run time that advance together, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,12 @@ from dynresp.response.choice import Choice, Chooser
 from dynresp.response.hit_simulation import HitStage
 from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.response import ResponseConfig
-from dynresp.response.runtime.dynamic_responder import DynamicResponder, EventKind, Flight, Phase
+from dynresp.response.runtime.dynamic_responder import (
+    DynamicResponder,
+    EventKind,
+    Phase,
+    SimulatedHit,
+)
 from dynresp.response.search.full_search_choice import FullSearchChooser
 from dynresp.response.transition.choice_to_motion import ending, finish
 from dynresp.response.transition.transition import blend_onto, place_on
@@ -25,14 +30,27 @@ from dynresp.support.errors import MotionError, UsageError
 
 
 class Crowd:
-    """Characters that play motions and answer hits as they come.
+    """Characters that play motions and react to hits at any moment, frame by frame.
 
-    A hit is answered as by `Responder`, frame by frame; each character has the bits that it would
-    have alone.
+    A character reacts as in `dynresp.hit`, but hits can come while the crowd runs, also while it
+    still reacts to an earlier one. Simulations of one kind of impact run together on all cores;
+    each character has bit for bit the poses that it would have alone.
 
     Attributes:
-        responders: The characters.
-        config: Settings.
+        responders: The characters, in the order of `bases`. `responders[i].hit(impact)` lets
+            something hit character i; its `pose`, `phase` and `events` say what it does.
+        config: Settings of simulation, search and blend.
+
+    Examples:
+        >>> import dynresp
+        >>> library = dynresp.load_library("builtin")
+        >>> walk = dynresp.load_motion("builtin:walk").resampled(30)
+        >>> crowd = dynresp.Crowd(dynresp.Character(), library, [walk, walk])
+        >>> crowd.responders[0].hit(dynresp.Ball(time=0.5, from_deg=180))
+        >>> for frame in range(60):
+        ...     poses = crowd.advance()
+        >>> poses.shape
+        (2, 59)
     """
 
     def __init__(
@@ -45,22 +63,23 @@ class Crowd:
         threads: int = 0,
         stage: HitStage | None = None,
     ) -> None:
-        """Make ready.
+        """Create the characters, each at the first frame of its base motion.
 
         Args:
             character: The body of all of them.
-            library: Its reactions, at the simulation's frame rate.
-            bases: What each plays, at that rate.
-            config: Settings.
-            chooser: What chooses, made for the same character and library with the same settings;
-                None for the oracle.
-            threads: Threads for the physics, 0 for all cores.
-            stage: Where scenes are kept, for several crowds of one body and the same settings,
-                with its own number of threads; None for one of its own.
+            library: Its reactions, at the simulation's frame rate (30 frames a second by default).
+            bases: The base motion of each character, at that frame rate; after its last frame the
+                last pose holds.
+            config: Settings of simulation, search and blend; None for the defaults.
+            chooser: Chooses the reactions (`dynresp.response.budget.chooser_for`), made for the
+                same character, library and settings; None for the full search (oracle).
+            threads: Threads for the simulation, 0 for all cores.
+            stage: Keeps compiled scenes for several crowds with the same character and settings;
+                its own number of threads counts. None for a new one.
 
         Raises:
             MotionError: There is no base motion, or a motion has another frame rate.
-            UsageError: The chooser was made for something else.
+            UsageError: The chooser was made for another character, library or config.
         """
         if not bases:
             raise MotionError("a crowd needs at least one base motion; none was given")
@@ -83,19 +102,18 @@ class Crowd:
         self._simulations: dict[ImpactorKind, Simulation] = {}
 
     def advance(self) -> FloatArray:
-        """Go on by one frame.
+        """Advance all characters by one frame.
 
         Returns:
-            (characters, 59) what they show.
+            (characters, 59) the poses that they show now: root position [m], then quaternions
+            w x y z of the root and the 13 joints.
         """
         for i, responder in enumerate(self.responders):
-            flight = responder.launch()
-            if flight is not None:
-                self._put(i, flight)
+            hit = responder.start_hit()
+            if hit is not None:
+                self._start_simulation(i, hit)
         for kind, simulation in self._simulations.items():
-            ids = [
-                i for i, flight in self._flights(Phase.APPROACH) if flight.setup.impact.kind is kind
-            ]
+            ids = [i for i, hit in self._hits_in(Phase.APPROACH) if hit.setup.impact.kind is kind]
             if ids:
                 self._approach(simulation, ids)
         for i, responder in enumerate(self.responders):
@@ -104,111 +122,111 @@ class Crowd:
 
     # -- stages of a hit ------------------------------------------------------------------------
 
-    def _flights(self, phase: Phase) -> Iterable[tuple[int, Flight]]:
+    def _hits_in(self, phase: Phase) -> Iterable[tuple[int, SimulatedHit]]:
         for i, responder in enumerate(self.responders):
-            if responder.phase is phase and responder.flight is not None:
-                yield i, responder.flight
+            if responder.phase is phase and responder.last_hit is not None:
+                yield i, responder.last_hit
 
-    def _put(self, i: int, flight: Flight) -> None:
-        """Put a hit into the batch of its kind, where every character has a place."""
-        kind = flight.setup.impact.kind
+    def _start_simulation(self, i: int, hit: SimulatedHit) -> None:
+        """Put a hit into the batch of its kind, in which every character has a row."""
+        kind = hit.setup.impact.kind
         if kind in self._simulations:
-            self._simulations[kind].replace(i, flight.setup)
+            self._simulations[kind].replace(i, hit.setup)
             return
-        # Until its turn comes a character's place holds a copy that is not run.
-        setups = [flight.setup] * len(self.responders)
+        # The rows of the other characters hold copies that do not run.
+        setups = [hit.setup] * len(self.responders)
         self._simulations[kind] = Simulation(self._stage.scene(kind), setups, self._stage.threads)
 
     def _approach(self, simulation: Simulation, ids: list[int]) -> None:
-        """One frame towards contact, and what follows from it."""
+        """Simulate one frame before contact, and handle contact, miss or divergence in it."""
         for i in ids:
-            # What it plays may have been changed.
-            simulation.setups[i] = self._flight(i).setup
+            # `DynamicResponder.play` may have changed what the character tracks.
+            simulation.setups[i] = self._last_hit(i).setup
         simulation.approach(ids)
-        hit = []
+        touched = []
         for i in ids:
             if simulation.diverged(i) is not None:
                 self._give_up(i, EventKind.DIVERGED)
             elif simulation.contact(i) is not None:
-                hit.append(i)
+                touched.append(i)
             elif simulation.frame(i) >= simulation.due(i):
                 self._give_up(i, EventKind.MISSED, simulation)
-        if hit:
-            self._plan(simulation, hit)
+        if touched:
+            self._choose(simulation, touched)
 
-    def _plan(self, simulation: Simulation, ids: list[int]) -> None:
+    def _choose(self, simulation: Simulation, ids: list[int]) -> None:
         """Events 2 to 4: look ahead, choose, and take the simulation back."""
         horizon = simulation.frames_of(self.config.horizon_s)
-        left: dict[int, list[int]] = {}
+        remaining: dict[int, list[int]] = {}
         for i in ids:
             contact = simulation.contact(i)
             assert contact is not None
-            left.setdefault(contact.frame + horizon - simulation.frame(i), []).append(i)
-        for frames, alike in left.items():
-            simulation.go_on(alike, frames)
-        flights = [self._flight(i) for i in ids]
+            remaining.setdefault(contact.frame + horizon - simulation.frame(i), []).append(i)
+        for frames, rows in remaining.items():
+            simulation.go_on(rows, frames)
+        simulated_hits = [self._last_hit(i) for i in ids]
         traces = [simulation.trace(i) for i in ids]
         seen = look_ahead_of(
             self._character,
             self.config,
-            [flight.base for flight in flights],
-            [flight.setup.impact for flight in flights],
+            [hit.base for hit in simulated_hits],
+            [hit.setup.impact for hit in simulated_hits],
             traces,
         )
         choices = dict(zip(seen.rows.tolist(), self._chooser.choose(seen), strict=True))
-        for row, (i, flight, trace) in enumerate(zip(ids, flights, traces, strict=True)):
+        for row, (i, hit, trace) in enumerate(zip(ids, simulated_hits, traces, strict=True)):
             if row not in choices:
                 self._give_up(i, EventKind.DIVERGED)
                 continue
             assert trace.contact is not None
             choice = choices[row]
             responder = self.responders[i]
-            contact_frame = flight.launch + trace.contact.frame
-            flight.choice, flight.trace = choice, trace
-            flight.exit = contact_frame + choice.exit
+            contact_frame = hit.start + trace.contact.frame
+            hit.choice, hit.trace = choice, trace
+            hit.exit = contact_frame + choice.exit
             responder.phase = Phase.PHYSICS
-            responder.tell(EventKind.CONTACT, contact_frame)
-            responder.tell(EventKind.CHOSEN, contact_frame, choice)
+            responder.add_event(EventKind.CONTACT, contact_frame)
+            responder.add_event(EventKind.CHOSEN, contact_frame, choice)
             if self.config.transition.second_pass:
-                # All of what follows the contact is simulated anew, towards what was chosen.
-                flight.trace = finish(simulation, {i: choice}, self.config.transition)[i]
-                if flight.trace.diverged is not None:
+                # Everything after contact is simulated again, towards the choice.
+                hit.trace = finish(simulation, {i: choice}, self.config.transition)[i]
+                if hit.trace.diverged is not None:
                     self._give_up(i, EventKind.DIVERGED)
                     continue
             else:
                 simulation.rewind(i, trace.contact.frame + choice.exit)
-            responder.tell(EventKind.REWOUND, contact_frame)
+            responder.add_event(EventKind.REWOUND, contact_frame)
 
-    def _begin_blend(self, i: int, flight: Flight, choice: Choice) -> None:
-        """Event 5: the rest of the simulation, and the blend."""
+    def _begin_blend(self, i: int, hit: SimulatedHit, choice: Choice) -> None:
+        """Event 5: simulate the rest, and blend."""
         responder = self.responders[i]
         transition = self.config.transition
-        final = flight.trace
+        final = hit.trace
         if not transition.second_pass:
-            simulation = self._simulations[flight.setup.impact.kind]
+            simulation = self._simulations[hit.setup.impact.kind]
             final = finish(simulation, {i: choice}, transition)[i]
         assert final is not None
         if final.diverged is not None:
             self._give_up(i, EventKind.DIVERGED)
             return
-        out = flight.exit - flight.launch
+        out = hit.exit - hit.start
         simulated = final.poses[out : out + transition.blend_frames(self.config.physics.fps) + 1]
         end = ending(self._character, self.config, simulated, choice)
-        flight.end = flight.exit + transition.blend_frames(self.config.physics.fps)
+        hit.end = hit.exit + transition.blend_frames(self.config.physics.fps)
         responder.enter(choice, simulated[0], end.poses)
-        responder.tell(EventKind.BLEND_BEGUN, flight.exit)
+        responder.add_event(EventKind.BLEND_BEGUN, hit.exit)
 
-    def _give_up(self, i: int, why: EventKind, simulation: Simulation | None = None) -> None:
-        """Blend from where the character is back to what it did.
+    def _give_up(self, i: int, event: EventKind, simulation: Simulation | None = None) -> None:
+        """Blend from the present pose back to the motion that was played.
 
         Args:
-            i: Which.
-            why: The event.
-            simulation: Where it goes on meanwhile; without, it stops where it is.
+            i: The character.
+            event: `EventKind.MISSED` or `EventKind.DIVERGED`.
+            simulation: Simulates the character during the blend; None holds the present pose.
         """
-        responder, flight = self.responders[i], self._flight(i)
+        responder, hit = self.responders[i], self._last_hit(i)
         length = self.config.transition.blend_frames(self.config.physics.fps)
-        responder.tell(why)
+        responder.add_event(event)
         start = responder.pose
         simulated = np.repeat(start[None], length + 1, axis=0)
         if simulation is not None:
@@ -217,42 +235,43 @@ class Crowd:
             trace = simulation.follow([i], [first], [targets], length)[0]
             if trace.diverged is None:
                 simulated = trace.poses[first : first + length + 1]
-        # One that was held is where its plan is; another is met where it stands.
+        # A character that was held is where its timeline is. Another one has moved away from it, so
+        # the timeline is placed on its present pose.
         base = responder.planned(responder.frame, length + 1)
-        placed = base if flight.setup.held else place_on(base, 0, start)
+        placed = base if hit.setup.held else place_on(base, 0, start)
         blend = blend_onto(simulated, placed)
         blend = raise_above(self._character, blend, self.config.physics.fps)
-        flight.exit, flight.end = responder.frame, responder.frame + length
-        responder.go_back(None if flight.setup.held else start, blend)
+        hit.exit, hit.end = responder.frame, responder.frame + length
+        responder.go_back(None if hit.setup.held else start, blend)
 
     def _show(self, i: int, responder: DynamicResponder) -> None:
-        """The next frame of one character."""
+        """Show the next frame of one character."""
         following = responder.frame + 1
-        flight = responder.flight
-        leaving = responder.phase is Phase.PHYSICS and flight and following >= flight.exit
-        if leaving and flight and flight.choice:
-            self._begin_blend(i, flight, flight.choice)
-        if responder.phase is Phase.APPROACH and flight:
-            simulation = self._simulations[flight.setup.impact.kind]
+        hit = responder.last_hit
+        leaving = responder.phase is Phase.PHYSICS and hit and following >= hit.exit
+        if leaving and hit and hit.choice:
+            self._begin_blend(i, hit, hit.choice)
+        if responder.phase is Phase.APPROACH and hit:
+            simulation = self._simulations[hit.setup.impact.kind]
             responder.show(simulation.pose(i))
-        elif responder.phase is Phase.PHYSICS and flight and flight.trace:
-            responder.show(flight.trace.poses[following - flight.launch])
+        elif responder.phase is Phase.PHYSICS and hit and hit.trace:
+            responder.show(hit.trace.poses[following - hit.start])
         else:
             responder.show(responder.planned(following, 1)[0])
-        if responder.phase is Phase.BLEND and flight and following >= flight.end:
+        if responder.phase is Phase.BLEND and hit and following >= hit.end:
             responder.phase = Phase.PLAYING
-            responder.tell(EventKind.BLEND_ENDED)
+            responder.add_event(EventKind.BLEND_ENDED)
 
-    def _flight(self, i: int) -> Flight:
-        flight = self.responders[i].flight
-        assert flight is not None
-        return flight
+    def _last_hit(self, i: int) -> SimulatedHit:
+        hit = self.responders[i].last_hit
+        assert hit is not None
+        return hit
 
 
 def _check_chooser(
     chooser: Chooser, character: Character, library: ReactionLibrary, config: ResponseConfig
 ) -> None:
-    """Refuse a chooser that was made for something else, before a hit finds it out."""
+    """Refuse a chooser that was made for something else."""
     for what, same in (
         ("character", chooser.character.identity == character.identity),
         ("library", chooser.library.identity == library.identity),
@@ -260,6 +279,6 @@ def _check_chooser(
     ):
         if not same:
             raise UsageError(
-                f"the chooser was made with another {what} than the crowd's; make it with the "
-                "character, the library and the config that the crowd is given"
+                f"the chooser was made with another {what} than the crowd; make it with the "
+                "character, the library and the config of the crowd"
             )

@@ -1,6 +1,6 @@
-"""A character at run time: it plays a motion, is hit, and goes on (Zordan et al. 2007, figure 2).
+"""One character at run time: it plays a motion, is hit and reacts (Zordan et al. 2007, figure 2).
 
-Frames count on the character's clock, which runs at the simulation's rate and is 0 when it begins.
+Frames count on the character's clock, which runs at the simulation's frame rate and starts at 0.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Setup, Trace
 from dynresp.response.choice import Choice
 from dynresp.response.response import CARRY_ON
-from dynresp.response.transition.pose_timeline import Plan
+from dynresp.response.transition.pose_timeline import PoseTimeline
 from dynresp.support.errors import MotionError, SpecError
 
-# Times of a hit count from frame 0 as long as it is due before this [s], so that they are rounded
-# as by `Responder`; later from shortly before it is due, since a character may play for hours.
+# A hit that is due before this time [s] is prepared from frame 0 on, so that its times are rounded
+# as `Responder` rounds them. A later one is prepared from `_LEAD_S` before it is due, because a
+# character may play for hours.
 _FROM_START_S = 10.0
-# That is more than any impact needs to come [s] (`dynresp.physics.impacts.flight_s`).
-_COMING_S = 1.0
-# Latest time from now at which a hit can be asked for [s].
+# More than any impact needs to arrive [s] (`dynresp.physics.impacts.flight_s`).
+_LEAD_S = 1.0
+# A hit can be due at most this long from now [s].
 _LATEST_S = 60.0
-# How much of what it would do a hit is prepared with, beyond the time at which it is due [s]: the
-# longest look-ahead, with room for the blend.
-_BEYOND_S = 5.0
-# So many events are remembered: those of at least a hundred hits.
-_EVENTS = 600
+# A hit is prepared with the expected motion until this long after it is due [s]: the longest
+# look-ahead, with room for the blend.
+_AFTER_S = 5.0
+# Number of events that are kept: those of at least a hundred hits.
+_MAX_EVENTS = 600
 
 
 class Phase(Enum):
@@ -42,7 +43,7 @@ class Phase(Enum):
     PLAYING = "playing"
     """A motion: the base motion, or a reaction after its blend."""
     APPROACH = "approach"
-    """The simulation, while something is on its way to it."""
+    """The simulation before contact, while an impact is on its way."""
     PHYSICS = "physics"
     """The simulation, after contact."""
     BLEND = "blend"
@@ -50,24 +51,24 @@ class Phase(Enum):
 
 
 class EventKind(Enum):
-    """The events of the paper's figure 2, and what can happen instead."""
+    """The six events of the paper's figure 2, and what can happen instead."""
 
     INVOKED = "invoked"
-    """1: something is on its way; the simulation begins."""
+    """1: an impact is on its way; the simulation begins."""
     CONTACT = "contact"
-    """2: it hits."""
+    """2: the impact touches the character."""
     CHOSEN = "chosen"
-    """3: looked ahead, chosen, aligned."""
+    """3: the look-ahead is done; a reaction is chosen and aligned."""
     REWOUND = "rewound"
     """4: the simulation is taken back."""
     BLEND_BEGUN = "blend begun"
-    """5: the simulation is left, the final blend begins."""
+    """5: the exit: the blend from the simulation begins."""
     BLEND_ENDED = "blend ended"
-    """6: what was chosen goes on alone."""
+    """6: the blend is over; the reaction or the base motion plays alone."""
     MISSED = "missed"
-    """Nothing was hit: it goes back to what it did."""
+    """Nothing was hit: the character goes back to its motion."""
     DIVERGED = "diverged"
-    """The simulation blew up: it goes back to what it did."""
+    """The simulation became unstable: the character goes back to its motion."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,9 @@ class Event:
     """Something that happened to a character.
 
     Attributes:
-        kind: What.
-        frame: When.
-        choice: How it goes on, of `EventKind.CHOSEN`.
+        kind: What happened.
+        frame: Frame of the character's clock.
+        choice: The choice, for `EventKind.CHOSEN`; None for other kinds.
     """
 
     kind: EventKind
@@ -86,37 +87,37 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Invoked:
-    """A hit that was asked for and has not begun.
+class PendingHit:
+    """A hit whose simulation has not begun.
 
     Attributes:
-        impact: What hits; its time counts from frame 0.
-        launch: When its simulation begins.
-        until: The last frame at which it may still hit.
+        impact: What hits; its time counts from frame 0 of the clock.
+        start: Frame at which its simulation begins.
+        last_contact: Last frame at which it may still hit.
     """
 
     impact: Impact
-    launch: int
-    until: int
+    start: int
+    last_contact: int
 
 
 @dataclass
-class Flight:
-    """A hit that is being simulated.
+class SimulatedHit:
+    """A hit whose simulation has begun. Frames are those of the character's clock.
 
     Attributes:
-        invoked: What was asked for.
-        launch: When its simulation began.
-        setup: Where it began from, and what it tracks.
-        base: What the character would do without it, from the launch on, for some seconds.
-        trace: What was simulated, once it is chosen when to leave it: at least to the exit.
-        choice: What was chosen.
-        exit: When the simulation is left.
-        end: When the blend has ended.
+        pending: The hit as it was given.
+        start: Frame at which its simulation began.
+        setup: Where the simulation began, and what it tracks.
+        base: What the character would do without the hit, from `start` on, for some seconds.
+        trace: The simulation, at least to the exit; None before the choice.
+        choice: The choice; None before it is made.
+        exit: Frame at which the blend begins.
+        end: Frame at which the blend has ended.
     """
 
-    invoked: Invoked
-    launch: int
+    pending: PendingHit
+    start: int
     setup: Setup
     base: Motion
     trace: Trace | None = None
@@ -126,74 +127,79 @@ class Flight:
 
 
 class DynamicResponder:
-    """A character of a `Crowd`, which advances it.
+    """One character of a `Crowd`; `Crowd.advance` moves it on by one frame.
 
     Attributes:
         character: Its body.
-        physics: How it is simulated.
-        frame: What its clock shows.
-        pose: (59,) what it shows itself.
+        physics: Settings of the simulation.
+        frame: The present frame of its clock.
+        pose: (59,) the pose that it shows now.
         phase: What moves it.
-        events: What happened to it last, in order: the events of a hundred hits at least.
-        flight: The last hit that was simulated, None before the first.
-        takeovers: How often what it plays was replaced or moved otherwise than by `play`: by a
-            reaction, by a hit that is carried on through, after a miss from where it stood.
+        events: What happened to it, oldest first; at least the events of the last hundred hits.
+        last_hit: The last hit whose simulation has begun; None before the first.
+        takeovers: How often something other than `play` has replaced or moved what it plays: a
+            reaction, no reaction (carry on) after a hit, or a miss that left it elsewhere.
     """
 
     def __init__(self, base: Motion, character: Character, physics: PhysicsConfig) -> None:
-        """Begin with the first frame of a motion; after its last frame the last pose holds."""
+        """Start with the first frame of a motion; after its last frame the last pose holds."""
         self.character = character
         self.physics = physics
         self.frame = 0
         self.phase = Phase.PLAYING
-        self.events: deque[Event] = deque(maxlen=_EVENTS)
-        self.flight: Flight | None = None
+        self.events: deque[Event] = deque(maxlen=_MAX_EVENTS)
+        self.last_hit: SimulatedHit | None = None
         self.takeovers = 0
-        self._plan = Plan.of(base.poses, 0)
+        self._timeline = PoseTimeline.of(base.poses, 0)
         self._name = base.name
         self.pose = base.poses[0]
         self._before: FloatArray | None = None
-        self._invoked: list[Invoked] = []
+        self._pending: list[PendingHit] = []
 
     @property
     def free_from(self) -> int | None:
-        """First frame from which `play` is allowed: the next, or the end of the blend.
+        """First frame from which `play` is allowed: the next frame, or the end of the blend.
 
-        None while it is simulated after a contact: what it goes on with is not laid yet.
+        None in `Phase.PHYSICS`, because it is not known yet where the character goes on.
         """
         if self.phase is Phase.PHYSICS:
             return None
-        if self.phase is Phase.BLEND and self.flight is not None:
-            return max(self.flight.end, self.frame + 1)
+        if self.phase is Phase.BLEND and self.last_hit is not None:
+            return max(self.last_hit.end, self.frame + 1)
         return self.frame + 1
 
     @property
     def planned_until(self) -> int:
-        """One past the last frame for which there is a pose to play; from there on that holds."""
-        return self._plan.end
+        """One past the last frame for which there is a pose; from there on the last pose holds."""
+        return self._timeline.end
 
     def planned(self, first: int, frames: int) -> FloatArray:
-        """(frames, 59) what it plays from a frame on, now or later, unless something hits it.
+        """The poses (frames, 59) that it plays from a frame on, unless something hits it.
 
-        While it is simulated after a contact, that is what it would have played without.
-        """
-        return self._plan.read(first, frames)
-
-    def play(self, motion: Motion, first: int | None = None) -> None:
-        """Play a motion from a frame on, in place of all that was to come.
-
-        Nothing is blended: the motion is to go on from what `planned` says for the frame before.
-        So one who plans endlessly gives it piece by piece; what is past is forgotten. The motion is
-        played as any other: it is tracked while something approaches, gone back to after a miss,
-        and moved on the ground with the rest where a hit is carried on through. A reaction takes
-        its place.
+        In `Phase.PHYSICS` they are what it would have played without the hit.
 
         Args:
-            motion: What, where it is in the world; after its last frame that pose holds.
-            first: The frame of the clock at which its first frame is due, by default `free_from`.
+            first: The first frame, the present one or a later one.
+            frames: How many.
+        """
+        return self._timeline.read(first, frames)
+
+    def play(self, motion: Motion, first: int | None = None) -> None:
+        """Play a motion from a frame on, in place of everything that was planned.
+
+        Nothing is blended: the motion must continue the pose that `planned` gives for the frame
+        before. An endless motion can be given piece by piece; the past is dropped. The motion is
+        treated as any other: the servos track it while something approaches, the character goes
+        back to it after a miss, and it is moved on the ground when there is no reaction (carry
+        on). A reaction takes its place.
+
+        Args:
+            motion: The motion, at its place in the world and at the simulation's frame rate. After
+                its last frame the last pose holds.
+            first: Frame of the clock at which its first pose is due; `free_from` by default.
 
         Raises:
-            SpecError: The frame is over, or the character is not free then.
+            SpecError: The character is not free at that frame.
             MotionError: The motion has another frame rate.
         """
         fps, free = self.physics.fps, self.free_from
@@ -204,26 +210,27 @@ class DynamicResponder:
             )
         if free is None:
             raise SpecError(
-                "a character that was hit plays nothing before its blend has begun; ask when "
-                "`free_from` tells a frame"
+                "a character that was hit can play no other motion before its blend has begun; "
+                "call `play` when `free_from` is a frame, not None"
             )
         if first is None:
             first = free
         if first < free:
             raise SpecError(f"first: the character is free from frame {free} on, got {first}")
-        flight = self.flight if self.phase is Phase.APPROACH else None
-        since = self.frame if flight is None else flight.launch
-        self._plan = self._plan.since(since).laid(motion.poses, first)
+        hit = self.last_hit if self.phase is Phase.APPROACH else None
+        since = self.frame if hit is None else hit.start
+        self._timeline = self._timeline.without_before(since).replaced_from(motion.poses, first)
         self._name = motion.name
-        if flight is not None:
-            flight.base = Motion(self.planned(flight.launch, len(flight.base)), fps, self._name)
-            flight.setup = replace(flight.setup, base=flight.base.poses)
+        if hit is not None:
+            hit.base = Motion(self.planned(hit.start, len(hit.base)), fps, self._name)
+            hit.setup = replace(hit.setup, base=hit.base.poses)
 
     def hit(self, impact: Impact) -> None:
-        """Let something hit it.
+        """Let something hit the character.
 
         Args:
-            impact: What; its time counts from now. A ball needs time to fly there, a push none.
+            impact: A `Ball`, `Punch`, `Push` or `Strike`; its `time` counts from now [s], at most
+                60. A ball needs at least 0.2 s to arrive, a push no time.
 
         Raises:
             SpecError: It comes too soon or too late, or while something else is on its way.
@@ -231,52 +238,54 @@ class DynamicResponder:
         fps = self.physics.fps
         if not impact.time <= _LATEST_S:
             raise SpecError(f"time must be at most {_LATEST_S:g} s from now, got {impact.time:g}")
-        asked = replace(impact, time=impact.time + self.frame / fps)
-        _, _, launch = self._prepared(asked, self._ahead())
-        if launch < self.frame:
+        dated = replace(impact, time=impact.time + self.frame / fps)
+        _, _, start = self._prepare(dated, self._expected())
+        if start < self.frame:
             raise SpecError(
                 f"time: the impact is due {impact.time:g} s from now and needs "
-                f"{impact.time + (self.frame - launch) / fps:.2f} s to come"
+                f"{impact.time + (self.frame - start) / fps:.2f} s to come; give a later time"
             )
         wait_s = 0.0 if isinstance(impact, Push) else WAIT_S
-        new = Invoked(asked, launch, int(np.ceil((asked.time + wait_s) * fps)))
-        for other in self._on_their_way():
-            if new.launch <= other.until and other.launch <= new.until:
+        new = PendingHit(dated, start, int(np.ceil((dated.time + wait_s) * fps)))
+        for other in self._on_the_way():
+            if new.start <= other.last_contact and other.start <= new.last_contact:
+                busy_s = (other.last_contact - self.frame) / fps
                 raise SpecError(
-                    f"time: something else may hit until {(other.until - self.frame) / fps:.2f} s "
-                    f"from now, and this would be on its way from "
-                    f"{(new.launch - self.frame) / fps:.2f} s on; one thing at a time can come"
+                    f"time: something else may hit until {busy_s:.2f} s from now, and this would "
+                    f"be on its way from {(new.start - self.frame) / fps:.2f} s on; one impact at "
+                    f"a time can be on its way"
                 )
-        self._invoked.append(new)
+        self._pending.append(new)
 
     # -- for the crowd --------------------------------------------------------------------------
 
-    def launch(self) -> Flight | None:
-        """Begin to simulate the hit whose time has come, if there is one."""
-        coming = [invoked for invoked in self._invoked if invoked.launch <= self.frame]
-        if not coming:
+    def start_hit(self) -> SimulatedHit | None:
+        """Set up the simulation of the hit whose time has come; None if there is none."""
+        pending = next((hit for hit in self._pending if hit.start <= self.frame), None)
+        if pending is None:
             return None
-        self._invoked.remove(coming[0])
-        impact = coming[0].impact
+        self._pending.remove(pending)
         if self.phase is Phase.PHYSICS:
-            self._plan = self._ahead()
+            self._timeline = self._expected()
             self.takeovers += 1
-        prepared, base, _ = self._prepared(impact, self._plan)
-        playing = self.phase is Phase.PLAYING
+        prepared, base, _ = self._prepare(pending.impact, self._timeline)
+        held = self.phase is Phase.PLAYING
         setup = Setup(
             base.poses,
             prepared,
             velocity=self._velocity(),
-            pose=None if playing else self.pose,
-            held=playing,
+            pose=None if held else self.pose,
+            held=held,
         )
-        self.flight = Flight(coming[0], self.frame, setup, base)
+        self.last_hit = SimulatedHit(pending, self.frame, setup, base)
         self.phase = Phase.APPROACH
-        self.tell(EventKind.INVOKED)
-        return self.flight
+        self.add_event(EventKind.INVOKED)
+        return self.last_hit
 
-    def tell(self, kind: EventKind, frame: int | None = None, choice: Choice | None = None) -> None:
-        """Note an event, now unless said otherwise."""
+    def add_event(
+        self, kind: EventKind, frame: int | None = None, choice: Choice | None = None
+    ) -> None:
+        """Record an event, by default at the present frame."""
         self.events.append(Event(kind, self.frame if frame is None else frame, choice))
 
     def show(self, pose: FloatArray) -> None:
@@ -285,86 +294,92 @@ class DynamicResponder:
         self._before, self.pose = self.pose, pose
 
     def enter(self, choice: Choice, simulated: FloatArray, poses: FloatArray) -> None:
-        """Leave the simulation for what was chosen.
+        """Leave the simulation and begin the blend.
 
         Args:
-            choice: What.
-            simulated: (59,) where the simulation is at the exit.
-            poses: (frames, 59) from there on, the blend first.
+            choice: The choice that was made.
+            simulated: (59,) the simulated pose at the exit.
+            poses: (frames, 59) from the exit on: the blend, and what follows it.
         """
-        assert self.flight is not None
-        plan = Plan.of(poses, self.flight.exit)
+        assert self.last_hit is not None
+        timeline = PoseTimeline.of(poses, self.last_hit.exit)
         if choice.name == CARRY_ON:
-            # After the poses it is the plan that goes on, however long.
-            plan = self._carried_on(choice, simulated, self.flight.exit)
-            plan = plan.patched(poses, self.flight.exit)
-        self._plan = plan.since(self.flight.exit)
+            # After these poses the timeline goes on, however long it is.
+            timeline = self._carry_on_timeline(choice, simulated, self.last_hit.exit)
+            timeline = timeline.replaced_within(poses, self.last_hit.exit)
+        self._timeline = timeline.without_before(self.last_hit.exit)
         self.takeovers += 1
         self.phase = Phase.BLEND
 
     def go_back(self, onto: FloatArray | None, poses: FloatArray) -> None:
-        """Leave the simulation for what was planned.
+        """Leave the simulation and blend back to the motion that was played.
 
         Args:
-            onto: (59,) where the plan is moved to; None leaves it where it is.
+            onto: (59,) pose on which the timeline is placed; None leaves it where it is.
             poses: (frames, 59) the blend, from now on.
         """
-        assert self.flight is not None
-        plan = self._plan
+        assert self.last_hit is not None
+        timeline = self._timeline
         if onto is not None:
-            plan = plan.placed_on(onto, self.frame)
+            timeline = timeline.placed_on(onto, self.frame)
             self.takeovers += 1
-        self._plan = plan.patched(poses, self.frame).since(self.frame)
+        self._timeline = timeline.replaced_within(poses, self.frame).without_before(self.frame)
         self.phase = Phase.BLEND
 
-    # -- what it would do -----------------------------------------------------------------------
+    # -- without a further hit ------------------------------------------------------------------
 
-    def _on_their_way(self) -> list[Invoked]:
-        """What was asked for and has neither hit nor missed."""
-        if self.phase is Phase.APPROACH and self.flight is not None:
-            return [self.flight.invoked, *self._invoked]
-        return self._invoked
+    def _on_the_way(self) -> list[PendingHit]:
+        """The hits that have neither touched nor missed."""
+        if self.phase is Phase.APPROACH and self.last_hit is not None:
+            return [self.last_hit.pending, *self._pending]
+        return self._pending
 
-    def _prepared(self, impact: Impact, plan: Plan) -> tuple[PreparedImpact, Motion, int]:
-        """A hit made ready: for the simulation, what the character would do, and when it begins.
+    def _prepare(
+        self, impact: Impact, timeline: PoseTimeline
+    ) -> tuple[PreparedImpact, Motion, int]:
+        """Prepare a hit.
 
         Args:
-            impact: Its time is that of the character's clock.
-            plan: What the character would do.
+            impact: What hits; its time counts from frame 0 of the clock.
+            timeline: What the character would do without it.
+
+        Returns:
+            The impact for the simulation, the character's motion from the simulation's start on,
+            and the frame of the clock at which the simulation starts.
         """
         fps = self.physics.fps
         first = 0
         if impact.time > _FROM_START_S:
-            first = int(np.floor((impact.time - _COMING_S) * fps))
-        last = int(np.ceil((impact.time + _BEYOND_S) * fps))
-        whole = Motion(plan.read(first, last - first), fps, self._name)
+            first = int(np.floor((impact.time - _LEAD_S) * fps))
+        last = int(np.ceil((impact.time + _AFTER_S) * fps))
+        whole = Motion(timeline.read(first, last - first), fps, self._name)
         due = replace(impact, time=impact.time - first / fps)
         prepared = prepare(due, whole, self.character, self.physics)
         base = whole.slice(prepared.start, len(whole))
         return replace(prepared, start=0), base, first + prepared.start
 
-    def _ahead(self) -> Plan:
-        """What it would do without a further hit."""
-        flight = self.flight
-        if self.phase is not Phase.PHYSICS or flight is None or flight.choice is None:
-            return self._plan
-        # What was chosen, as if it were entered by the clock from where the character is.
-        choice = flight.choice
+    def _expected(self) -> PoseTimeline:
+        """What the character would do without a further hit."""
+        hit = self.last_hit
+        if self.phase is not Phase.PHYSICS or hit is None or hit.choice is None:
+            return self._timeline
+        # As if the choice were entered now, from the present pose.
+        choice = hit.choice
         if choice.name == CARRY_ON:
-            return self._carried_on(choice, self.pose, self.frame)
-        reaction = Plan.of(choice.motion.poses, flight.exit - choice.entry)
+            return self._carry_on_timeline(choice, self.pose, self.frame)
+        reaction = PoseTimeline.of(choice.motion.poses, hit.exit - choice.entry)
         return reaction.placed_on(self.pose, self.frame)
 
-    def _carried_on(self, choice: Choice, pose: FloatArray, frame: int) -> Plan:
-        """The plan gone on with by the clock of a choice, from where a pose is at a frame."""
-        assert self.flight is not None
-        later = self.flight.exit - (self.flight.launch + choice.entry)
-        return self._plan.placed_on(pose, frame, later)
+    def _carry_on_timeline(self, choice: Choice, pose: FloatArray, frame: int) -> PoseTimeline:
+        """The timeline at the time at which a choice enters it, placed on a pose at a frame."""
+        assert self.last_hit is not None
+        delay = self.last_hit.exit - (self.last_hit.start + choice.entry)
+        return self._timeline.placed_on(pose, frame, delay)
 
     def _velocity(self) -> FloatArray:
-        """How it moves now (45,)."""
-        if self.phase is Phase.PHYSICS and self.flight is not None and self.flight.trace:
-            return self.flight.trace.velocities[self.frame - self.flight.launch]
+        """The present velocity (45,), a row of `qvel`."""
+        if self.phase is Phase.PHYSICS and self.last_hit is not None and self.last_hit.trace:
+            return self.last_hit.trace.velocities[self.frame - self.last_hit.start]
         before = [] if self._before is None else [self._before[None]]
         near = np.concatenate([*before, self.planned(self.frame, 2)])
         return pose_velocities(near, self.physics.fps)[len(before)]

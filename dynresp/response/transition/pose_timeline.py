@@ -1,4 +1,4 @@
-"""What a character is to show: poses laid one after the other on its clock."""
+"""The poses that a character is to show from now on, frame by frame on its clock."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from dynresp.motion.rotations import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """Poses that follow each other, and where they are put.
+class TimelinePiece:
+    """Consecutive poses and where they are placed.
 
     Attributes:
-        first: When the first of them is due.
-        poses: (frames, 59) as they were given.
-        turn: They are turned by it about the world's vertical [rad],
-        shift: and then shifted (3,) [m].
+        first: Frame of the clock at which the first pose is due.
+        poses: (frames, 59) as they were given, not yet placed.
+        turn: Angle by which they are turned about the world's vertical axis [rad].
+        shift: (3,) by which they are then moved [m].
     """
 
     first: int
@@ -30,93 +30,99 @@ class Stretch:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """Stretches of poses, each until the next begins; where one is too short its last pose holds.
+class PoseTimeline:
+    """Pieces of poses; each counts until the next begins, and its last pose holds if it is short.
 
-    Poses are kept as they were given and moved when they are read, so that to change a plan costs
-    the same however long it is.
+    Poses are kept as they were given and placed only when they are read. So a change costs the
+    same, no matter how long the timeline is. Methods return new timelines.
 
     Attributes:
-        stretches: In the order of their first frames; at least one.
+        pieces: In the order of their first frames; at least one.
     """
 
-    stretches: tuple[Stretch, ...]
+    pieces: tuple[TimelinePiece, ...]
 
     @classmethod
-    def of(cls, poses: FloatArray, first: int) -> Plan:
-        """Poses (frames, 59), the first of them due at a frame."""
-        return cls((Stretch(first, poses, 0.0, np.zeros(3)),))
+    def of(cls, poses: FloatArray, first: int) -> PoseTimeline:
+        """A timeline of poses (frames, 59), the first of them due at frame `first`."""
+        return cls((TimelinePiece(first, poses, 0.0, np.zeros(3)),))
 
     @property
     def end(self) -> int:
-        """One past the last frame for which there is a pose; from there on the last one holds."""
-        return self.stretches[-1].first + len(self.stretches[-1].poses)
+        """One past the last frame that has a pose; from there on the last pose holds."""
+        return self.pieces[-1].first + len(self.pieces[-1].poses)
 
     def read(self, first: int, frames: int) -> FloatArray:
-        """(frames, 59) what is due from a frame on; before the first pose, the first holds."""
+        """The poses (frames, 59) from frame `first` on; before the first pose, the first holds."""
         out = []
         stop = first + frames
-        ends = [stretch.first for stretch in self.stretches[1:]]
-        for k, (stretch, end) in enumerate(zip(self.stretches, [*ends, stop], strict=True)):
-            begin = first if k == 0 else max(first, stretch.first)
-            at = np.arange(begin, min(end, stop)) - stretch.first
+        ends = [piece.first for piece in self.pieces[1:]]
+        for k, (piece, end) in enumerate(zip(self.pieces, [*ends, stop], strict=True)):
+            begin = first if k == 0 else max(first, piece.first)
+            at = np.arange(begin, min(end, stop)) - piece.first
             if not len(at):
                 continue
-            poses = stretch.poses[np.clip(at, 0, len(stretch.poses) - 1)]
-            if stretch.turn or stretch.shift.any():
-                poses = move_poses(poses, stretch.turn, stretch.shift)
+            poses = piece.poses[np.clip(at, 0, len(piece.poses) - 1)]
+            if piece.turn or piece.shift.any():
+                poses = move_poses(poses, piece.turn, piece.shift)
             out.append(poses)
         return np.concatenate(out)
 
-    def laid(self, poses: FloatArray, first: int) -> Plan:
-        """The plan with poses (frames, 59) in place of all that was due from a frame on."""
-        return Plan((*self._before(first), *Plan.of(poses, first).stretches))
+    def replaced_from(self, poses: FloatArray, first: int) -> PoseTimeline:
+        """The timeline with poses (frames, 59) in place of everything from frame `first` on."""
+        return PoseTimeline((*self._before(first), *PoseTimeline.of(poses, first).pieces))
 
-    def patched(self, poses: FloatArray, first: int) -> Plan:
-        """The plan with poses (frames, 59) from a frame on, and then as it was."""
-        rest = self.since(first + len(poses)).stretches
-        return Plan((*self.laid(poses, first).stretches, *rest))
+    def replaced_within(self, poses: FloatArray, first: int) -> PoseTimeline:
+        """The timeline with poses (frames, 59) from `first` on; after them it is unchanged."""
+        rest = self.without_before(first + len(poses)).pieces
+        return PoseTimeline((*self.replaced_from(poses, first).pieces, *rest))
 
-    def since(self, frame: int) -> Plan:
-        """The plan without what was due before a frame."""
+    def without_before(self, frame: int) -> PoseTimeline:
+        """The timeline without what was due before a frame."""
         at = len(self._before(frame + 1)) - 1
         if at < 0:
             return self
-        stretch = self.stretches[at]
-        gone = min(frame - stretch.first, len(stretch.poses) - 1)
-        cut = replace(stretch, first=frame, poses=stretch.poses[gone:])
-        return Plan((cut, *self.stretches[at + 1 :]))
+        piece = self.pieces[at]
+        passed = min(frame - piece.first, len(piece.poses) - 1)
+        cut = replace(piece, first=frame, poses=piece.poses[passed:])
+        return PoseTimeline((cut, *self.pieces[at + 1 :]))
 
-    def moved(self, later: int, turn: float, shift: FloatArray) -> Plan:
-        """The plan so many frames later, turned about the vertical [rad], then shifted (3,) [m]."""
-        round_about = rotations.from_yaw(turn)
-        return Plan(
+    def moved(self, delay: int, turn: float, shift: FloatArray) -> PoseTimeline:
+        """The timeline moved.
+
+        Args:
+            delay: By how many frames it comes later.
+            turn: Angle by which it is turned about the vertical axis [rad].
+            shift: (3,) by which it is then moved [m].
+        """
+        rotation = rotations.from_yaw(turn)
+        return PoseTimeline(
             tuple(
-                Stretch(
-                    stretch.first + later,
-                    stretch.poses,
-                    stretch.turn + turn,
-                    rotations.rotate(round_about, stretch.shift) + shift,
+                TimelinePiece(
+                    piece.first + delay,
+                    piece.poses,
+                    piece.turn + turn,
+                    rotations.rotate(rotation, piece.shift) + shift,
                 )
-                for stretch in self.stretches
+                for piece in self.pieces
             )
         )
 
-    def placed_on(self, pose: FloatArray, frame: int, later: int = 0) -> Plan:
-        """The plan moved on the ground so that at a frame it stands and faces where a pose does.
+    def placed_on(self, pose: FloatArray, frame: int, delay: int = 0) -> PoseTimeline:
+        """The timeline moved on the ground so that at a frame it stands and faces as a pose does.
 
-        As `dynresp.response.transition.transition.place_on` moves a reaction.
+        It is moved as `dynresp.response.transition.transition.place_on` moves a reaction.
 
         Args:
             pose: (59,) where the character is.
-            frame: When.
-            later: By how many frames the plan is put off before.
+            frame: The frame at which it is there.
+            delay: By how many frames the timeline is delayed first.
         """
-        due = self.read(frame - later, 1)[0]
+        due = self.read(frame - delay, 1)[0]
         turn = float(rotations.yaw_of(pose[ROOT_QUAT]) - rotations.yaw_of(due[ROOT_QUAT]))
-        now = rotations.rotate(rotations.from_yaw(turn), due[ROOT])
-        return self.moved(later, turn, np.array([pose[0] - now[0], pose[1] - now[1], 0.0]))
+        turned = rotations.rotate(rotations.from_yaw(turn), due[ROOT])
+        return self.moved(delay, turn, np.array([pose[0] - turned[0], pose[1] - turned[1], 0.0]))
 
-    def _before(self, frame: int) -> tuple[Stretch, ...]:
-        """The stretches that begin before a frame."""
-        return tuple(stretch for stretch in self.stretches if stretch.first < frame)
+    def _before(self, frame: int) -> tuple[TimelinePiece, ...]:
+        """The pieces that begin before a frame."""
+        return tuple(piece for piece in self.pieces if piece.first < frame)

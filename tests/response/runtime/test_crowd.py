@@ -273,22 +273,22 @@ def test_a_second_hit_begins_where_the_first_has_come_to(
     responder.hit(HARD)
     _run_until(crowd, Phase.PHYSICS)
     crowd.advance()
-    first = responder.flight
+    first = responder.last_hit
     assert first is not None
     assert first.trace is not None
     assert first.choice is not None
-    now = responder.frame - first.launch
+    now = responder.frame - first.start
     before, exit_frame = responder.pose, first.exit
     responder.hit(Push(0.0, 900.0, 0.2, from_deg=90.0))
     crowd.advance()
-    second = responder.flight
+    second = responder.last_hit
     assert second is not None
     assert second is not first
     np.testing.assert_array_equal(second.setup.pose, before)
     np.testing.assert_array_equal(second.setup.velocity, first.trace.velocities[now])
     assert not second.setup.held
     # What would go on is the choice under way, by the clock.
-    entry = first.choice.entry - (exit_frame - (first.launch + now))
+    entry = first.choice.entry - (exit_frame - (first.start + now))
     entered = first.choice.motion.poses[max(entry, 0)]
     np.testing.assert_allclose(second.base.poses[0, 7:], entered[7:], atol=1e-12)
 
@@ -299,10 +299,10 @@ def test_a_hit_while_playing_is_held_and_begins_with_the_motions_own_velocity(
     crowd = _crowd(character, library, base)
     crowd.responders[0].hit(HARD)
     _run_until(crowd, Phase.APPROACH)
-    flight = crowd.responders[0].flight
-    assert flight is not None
-    assert flight.setup.held
-    np.testing.assert_allclose(flight.setup.velocity, base.velocities()[flight.launch], atol=1e-12)
+    hit = crowd.responders[0].last_hit
+    assert hit is not None
+    assert hit.setup.held
+    np.testing.assert_allclose(hit.setup.velocity, base.velocities()[hit.start], atol=1e-12)
 
 
 @pytest.mark.parametrize("phase", [Phase.APPROACH, Phase.PHYSICS])
@@ -361,8 +361,8 @@ def test_a_character_that_has_played_for_long_is_hit_as_any(
         crowd.advance()
     responder.hit(HARD)
     _run_until(crowd, Phase.APPROACH)
-    assert responder.flight is not None
-    assert len(responder.flight.base) < 300
+    assert responder.last_hit is not None
+    assert len(responder.last_hit.base) < 300
     for _ in range(40):
         crowd.advance()
     assert EventKind.CHOSEN in _kinds(responder)
