@@ -1,7 +1,7 @@
 """Slow twin of `dynresp.locomotion.worlds.terrain_walk`: which states of a walk can be reached.
 
-Told from the graph's placements in metres and from where the soles are, for recorded steps alone
-and feet that need not be drawn in.
+It computes with the graph's placements in metres and the positions of the soles. It takes recorded
+steps alone, and feet need not be drawn in.
 """
 
 import numpy as np
@@ -47,9 +47,9 @@ def reachable(graph: TerrainGraph, terrain: Terrain, start: AvatarState) -> list
     while waiting:
         frame, place = waiting.pop()
         roots.append(placement.compose(place, database.planar[frame]))
-        for way in range(graph.graph.offsets[frame], graph.graph.offsets[frame + 1]):
-            entry = int(graph.graph.targets[way])
-            there = placement.compose(place, graph.graph.placements[way])
+        for edge in range(graph.graph.offsets[frame], graph.graph.offsets[frame + 1]):
+            entry = int(graph.graph.targets[edge])
+            there = placement.compose(place, graph.graph.placements[edge])
             key = (entry, *np.round(there, 3) + 0.0)
             if key in seen:
                 continue

@@ -9,10 +9,9 @@ from dynresp.locomotion.sketch.path_search import SearchConfig
 from dynresp.locomotion.sketch.path_walk import SketchConfig
 from dynresp.locomotion.worlds.maze import MazeConfig
 from dynresp.locomotion.worlds.path_planning import PlanningConfig
-from dynresp.locomotion.worlds.terrain_walk import TerrainWalkConfig
 from dynresp.support.errors import UsageError
 
-ALL = (SearchConfig, SketchConfig, PlanningConfig, MazeConfig, TerrainWalkConfig)
+ALL = (SearchConfig, SketchConfig, PlanningConfig, MazeConfig)
 
 
 @pytest.mark.parametrize("kind", ALL)

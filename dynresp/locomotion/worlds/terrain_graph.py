@@ -115,23 +115,23 @@ class TerrainGraph:
             cell: (2,) its column and row.
             turns: Its quarter turns.
         """
-        place = np.array([*np.asarray(cell), 0, turns], dtype=np.int64)
+        found = np.array([*np.asarray(cell), 0, turns], dtype=np.int64)
         feet = np.flatnonzero(self.stands[frame])
-        blocks = self.blocks_under(terrain, [frame], self.meters(terrain, place[None]))[0, feet]
+        blocks = self.blocks_under(terrain, [frame], self.meters(terrain, found[None]))[0, feet]
         levels = terrain.levels[tuple(blocks.T)] - self.levels[frame, feet]
         if (blocks < 0).any() or np.ptp(levels) > 0:
             return None
-        place[2] = levels[0]
-        return place
+        found[2] = levels[0]
+        return found
 
-    def meters(self, terrain: Terrain, places: LongArray) -> FloatArray:
+    def meters(self, terrain: Terrain, cell_placements: LongArray) -> FloatArray:
         """Placements (..., 4) [m, rad] of cell placements (..., 4) on a terrain."""
-        out = places * self._unit
+        out = cell_placements * self._unit
         out[..., :2] += terrain.corner
         out[..., 3] = placement.wrapped(out[..., 3])
         return np.asarray(out)
 
-    def place(self, terrain: Terrain, at: npt.ArrayLike) -> LongArray:
+    def cell_placement(self, terrain: Terrain, at: npt.ArrayLike) -> LongArray:
         """The cell placement (4,) of a placement (4,) on a terrain.
 
         Raises:

@@ -12,7 +12,6 @@ stick out over an edge may be drawn in. Both cost, and `terrain_fitting` bends t
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from dataclasses import dataclass
 
@@ -27,78 +26,30 @@ from dynresp.locomotion.worlds.terrain import Terrain
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import LongArray
-from dynresp.support.checks import check_numbers
 from dynresp.support.errors import UsageError
 
 # Distance of the points of a path [m].
 _SPACING = 0.1
+# Most levels by which a stance may be higher or lower than recorded, seen from the last stance of
+# the other foot; 0 allows recorded steps only.
+_MAX_LEVEL_CHANGE = 2
+# Largest distance by which a foot is drawn in from an edge, and distance that soles keep from
+# edges [m].
+_MAX_DRAW_M, _EDGE_M = 0.08, 0.01
+# Largest distance of the root from the end at arrival [m].
+_ARRIVAL_M = 0.3
+# Most states to continue; then the search starts again, greedier, up to three times: _GREED is the
+# weight of eq. 8 against the costs. The second budget is that of the search for a start, and of one
+# stretch of a random walk.
+_BUDGET, _STRETCH_BUDGET = 100_000, 10_000
+_GREED = (1.0, 2.0, 4.0, 8.0)
 # Most starts that are tried, and how long a walk from one must be [s].
 _STARTS, _MIN_WALK_S = 300, 4.0
-# Most states of the search for a start, and for one stretch of a random walk.
-_STRETCH_BUDGET = 10_000
 # Distance of the next goal of a random walk [m], from and to. The last number is how many goals are
 # tried before a stretch is taken back, and how many stretches are taken back at most.
 _MIN_GOAL_M, _MAX_GOAL_M, _TRIES = 1.5, 6.0, 20
-# Weights of eq. 8 against the costs: after the budget is spent, the search starts again greedier.
-_GREED = (1.0, 2.0, 4.0, 8.0)
 # Cost of facing away from the wanted direction when a start is chosen [m/rad].
 _TURN = 0.3
-
-
-@dataclass(frozen=True)
-class TerrainWalkConfig:
-    """What a good walk over blocks is, and how long to search for one.
-
-    Attributes:
-        facing: c of eq. 8, at least 0 and below 1.
-        ahead_m: The avatar should face the point of the path this far ahead [m].
-        pace: Cost of a second [m].
-        stray: At a distance d from a path a second costs 1 + stray d^2 times as much [1/m^2].
-        farthest_m: Largest distance from a path [m].
-        jump: Cost of a jump for each unit of its distance (eq. 2) [m].
-        hurry: Further cost of a jump right after another [m].
-        haste_s: Time between two jumps at which that cost has fallen to 0 [s].
-        adapt: Most levels by which a stance may be higher or lower than recorded, seen from the
-            last stance of the other foot; 0 allows recorded steps only.
-        stretch: Cost of that for each squared level [m].
-        draw_m: Largest distance by which a foot is drawn in from an edge [m].
-        draw: Cost of a metre of that [m].
-        edge_m: Distance that soles keep from edges [m].
-        arrival_m: Largest distance of the root from the end at arrival [m].
-        budget: Most states to continue; then the search starts again, greedier, up to three times.
-
-    Raises:
-        UsageError: A number is out of range.
-    """
-
-    facing: float = 0.2
-    ahead_m: float = 0.6
-    pace: float = 0.1
-    stray: float = 2.0
-    farthest_m: float = 2.0
-    jump: float = 1.0
-    hurry: float = 0.3
-    haste_s: float = 1.0
-    adapt: int = 2
-    stretch: float = 0.2
-    draw_m: float = 0.08
-    draw: float = 2.0
-    edge_m: float = 0.01
-    arrival_m: float = 0.3
-    budget: int = 100_000
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        check_numbers(self)
-        if not 0 <= self.facing < 1:
-            raise UsageError(f"facing must be at least 0 and below 1, got {self.facing}")
-        for name in ("ahead_m", "pace", "stray", "jump", "hurry", "adapt", "stretch", "draw_m",
-                     "draw", "edge_m"):  # fmt: skip
-            if not getattr(self, name) >= 0:
-                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
-        for name in ("farthest_m", "haste_s", "arrival_m", "budget"):
-            if not getattr(self, name) > 0:
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +63,7 @@ class TerrainWalk:
         roots: (k, 4) x, y, z [m] and yaw [rad] of the root, as recorded and placed.
         blocks: (k, 2, 2) column and row of the block on which each foot stands; -1 if it does not
             stand.
-        arrived: Whether it reaches the end; if not, there is no way on, or the budget was spent.
+        arrived: Whether it reaches the end; if not, no step leads on, or the budget was spent.
         off_goal: Distance of the last root from the goal [m]; NaN without a goal.
         looked: States that the search continued.
         taken_back: Stretches of a random walk that were taken back because they led nowhere.
@@ -135,22 +86,19 @@ def start_on_terrain(
     terrain: Terrain,
     at: npt.ArrayLike,
     toward: npt.ArrayLike,
-    config: TerrainWalkConfig | None = None,
 ) -> AvatarState:
-    """Find a state to begin from: it stands near a point, faces another, and has a way on.
+    """Find a state to begin from: it stands near a point, faces another, and can walk on.
 
     Args:
         graph: The prepared graph.
         terrain: The blocks.
         at: (2,) where the root should be [m].
         toward: (2,) what it should face [m].
-        config: What a good walk is.
 
     Raises:
         UsageError: No frame of the graph stands on the blocks there and can go on.
     """
     graph.check(terrain)
-    small = dataclasses.replace(config or TerrainWalkConfig(), budget=_STRETCH_BUDGET)
     here, goal = as_point(at, "a start"), as_point(toward, "a point to face")
     frames = graph.graph.frames
     frames = frames[graph.stands[frames].any(axis=1)]
@@ -166,10 +114,10 @@ def start_on_terrain(
     for k in np.argsort(np.concatenate(costs), kind="stable")[:_STARTS]:
         turns, row = divmod(int(k), len(frames))
         frame = int(frames[row])
-        place = graph.standing(terrain, frame, cells[turns][row], turns)
-        if place is not None:
-            state = AvatarState(frame, graph.meters(terrain, place))
-            found = _search(graph, terrain, state, goal[None], small)
+        cell_placement = graph.standing(terrain, frame, cells[turns][row], turns)
+        if cell_placement is not None:
+            state = AvatarState(frame, graph.meters(terrain, cell_placement))
+            found = _search(graph, terrain, state, goal[None], _STRETCH_BUDGET)
             if found.arrived or len(found.frames) > _MIN_WALK_S * graph.graph.database.fps:
                 return state
     raise UsageError(
@@ -184,7 +132,6 @@ def reach_on_terrain(
     terrain: Terrain,
     start: AvatarState,
     goal: npt.ArrayLike,
-    config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
     """Walk to a goal.
 
@@ -193,7 +140,6 @@ def reach_on_terrain(
         terrain: The blocks.
         start: Where it is; see `start_on_terrain`.
         goal: (2,) the goal [m].
-        config: What a good walk is.
 
     Raises:
         UsageError: The start does not stand on the blocks, or the goal is not on the grid.
@@ -204,7 +150,7 @@ def reach_on_terrain(
             f"a goal must be x and y inside the grid of {terrain.size[0]:g} x "
             f"{terrain.size[1]:g} m, got {end}"
         )
-    return _search(graph, terrain, start, end[None], config or TerrainWalkConfig())
+    return _search(graph, terrain, start, end[None], _BUDGET)
 
 
 def follow_on_terrain(
@@ -212,7 +158,6 @@ def follow_on_terrain(
     terrain: Terrain,
     start: AvatarState,
     sketch: npt.ArrayLike,
-    config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
     """Walk along a sketched path.
 
@@ -222,7 +167,6 @@ def follow_on_terrain(
         start: Where it is; see `start_on_terrain`. The path begins there even if the sketch
             does not.
         sketch: (k, 2) corners of a path on the ground [m].
-        config: What a good walk is.
 
     Raises:
         UsageError: The start does not stand on the blocks, or the sketch is not a path.
@@ -233,7 +177,7 @@ def follow_on_terrain(
         corners = np.concatenate([root[None], corners])
     check_length(corners, "the sketch, from where the avatar is on,")
     points = resampled(corners, _SPACING)
-    return _search(graph, terrain, start, points, config or TerrainWalkConfig())
+    return _search(graph, terrain, start, points, _BUDGET)
 
 
 def wander_on_terrain(
@@ -242,7 +186,6 @@ def wander_on_terrain(
     start: AvatarState,
     frames: int,
     rng: np.random.Generator,
-    config: TerrainWalkConfig | None = None,
 ) -> TerrainWalk:
     """Walk from one random goal to the next.
 
@@ -256,7 +199,6 @@ def wander_on_terrain(
         start: Where it is; see `start_on_terrain`.
         frames: Number of frames to walk.
         rng: Source of random numbers.
-        config: What a good walk is; `budget` is for each stretch.
 
     Returns:
         The walk; shorter, with `arrived` false, if no goal can be reached from the start.
@@ -266,7 +208,6 @@ def wander_on_terrain(
     """
     if frames < 1:
         raise UsageError(f"a walk needs at least 1 frame, got {frames}")
-    config = config or TerrainWalkConfig(budget=_STRETCH_BUDGET)
     began = time.perf_counter()
     stretches: list[TerrainWalk] = []
     played = looked = taken_back = tried = 0
@@ -275,7 +216,7 @@ def wander_on_terrain(
         if stretches:
             at = AvatarState(int(stretches[-1].frames[-1]), stretches[-1].placements[-1])
         goal = _random_goal(terrain, at.root(graph.graph)[:2], rng)
-        found = reach_on_terrain(graph, terrain, at, goal, config)
+        found = _search(graph, terrain, at, goal[None], _STRETCH_BUDGET)
         looked += found.looked
         tried += 1
         if found.arrived:
@@ -288,10 +229,12 @@ def wander_on_terrain(
             played -= len(stretches.pop().frames) - 1
             taken_back += 1
             tried = 0
-    ways = [np.array([start.frame]), *(stretch.frames[1:] for stretch in stretches)]
-    puts = [start.placement[None], *(stretch.placements[1:] for stretch in stretches)]
+    walked = np.concatenate([[start.frame], *(stretch.frames[1:] for stretch in stretches)])
+    placements = np.concatenate(
+        [start.placement[None], *(stretch.placements[1:] for stretch in stretches)]
+    )
     return _walk(
-        graph, terrain, np.concatenate(ways)[: frames + 1], np.concatenate(puts)[: frames + 1],
+        graph, terrain, walked[: frames + 1], placements[: frames + 1],
         played >= frames, np.full(2, np.nan), looked, taken_back, began,
     )  # fmt: skip
 
@@ -299,75 +242,68 @@ def wander_on_terrain(
 def _random_goal(terrain: Terrain, here: FloatArray, rng: np.random.Generator) -> FloatArray:
     """A point on the grid, 1.5 to 6 m away if the grid is large enough."""
     for _ in range(_TRIES):
-        place = terrain.corner + rng.random(2) * terrain.size
-        if _MIN_GOAL_M <= np.hypot(*(place - here)) <= _MAX_GOAL_M:
+        goal = terrain.corner + rng.random(2) * terrain.size
+        if _MIN_GOAL_M <= np.hypot(*(goal - here)) <= _MAX_GOAL_M:
             break
-    return np.asarray(place)
+    return np.asarray(goal)
 
 
 def _search(
-    graph: TerrainGraph,
-    terrain: Terrain,
-    start: AvatarState,
-    path: FloatArray,
-    config: TerrainWalkConfig,
+    graph: TerrainGraph, terrain: Terrain, start: AvatarState, path: FloatArray, budget: int
 ) -> TerrainWalk:
+    """Search along a path (p, 2), points _SPACING apart or the goal alone [m]."""
     from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
 
     began = time.perf_counter()
-    begin, feet, settings = _begin(graph, terrain, start, config)
-    ways = (graph.graph.offsets, graph.graph.targets, graph.graph.distances, graph.moves)
-    told, looked = np.zeros(2, dtype=np.int64), 0
-    for settings[kernel.GREED] in _GREED:
-        played, places = kernel.search_kernel(
-            start.frame, begin, settings, np.ascontiguousarray(path - terrain.corner),
-            config.budget, ways, graph.planar, feet, terrain.levels.astype(np.int64), told,
-        )  # fmt: skip
-        looked += int(told[1])
-        if told[0] or told[1] < config.budget:
+    begin = _begin(graph, terrain, start)
+    fps = graph.graph.database.fps
+    over = graph.over + _EDGE_M
+    over.flags.writeable = False
+    feet = kernel.FeetArrays(graph.stands, graph.blocks, graph.levels, over)
+    motions = kernel.GraphArrays(
+        graph.graph.offsets, graph.graph.targets, graph.graph.distances, graph.moves, graph.planar
+    )
+    points = np.ascontiguousarray(path - terrain.corner)
+    grid = terrain.levels.astype(np.int64)
+    looked = 0
+    for greed in _GREED:
+        settings = kernel.WalkSettings(
+            max_level_change=float(_MAX_LEVEL_CHANGE),
+            max_draw_m=_MAX_DRAW_M,
+            arrival_m=_ARRIVAL_M,
+            spacing_m=_SPACING,
+            block_m=float(terrain.block_m),
+            frame_s=float(1.0 / fps),
+            greed=greed,
+            window=int(np.ceil(window_m(fps) / _SPACING)),
+            budget=budget,
+        )
+        found = kernel.search_kernel(start.frame, begin, points, settings, motions, feet, grid)
+        looked += found.looked
+        if found.arrived or found.looked < budget:
             break
-    frames = np.concatenate([[start.frame], played])
-    placements = np.concatenate([start.placement[None], graph.meters(terrain, places)])
-    return _walk(graph, terrain, frames, placements, bool(told[0]), path[-1], looked, 0, began)
+    frames = np.concatenate([[start.frame], found.frames])
+    placements = np.concatenate([start.placement[None], graph.meters(terrain, found.placements)])
+    return _walk(graph, terrain, frames, placements, found.arrived, path[-1], looked, 0, began)
 
 
-def _begin(
-    graph: TerrainGraph, terrain: Terrain, start: AvatarState, config: TerrainWalkConfig
-) -> tuple[LongArray, tuple[npt.NDArray, ...], FloatArray]:  # type: ignore[type-arg]
-    """The start, the feet and the settings for the kernel."""
-    from dynresp.locomotion.worlds import terrain_walk_kernel as kernel
-
+def _begin(graph: TerrainGraph, terrain: Terrain, start: AvatarState) -> LongArray:
+    """The state (6,) at which the search begins: a cell placement, and the lifts of both feet."""
     graph.check(terrain)
     check_in_component(graph.graph, start.frame)
-    place = graph.place(terrain, start.placement)
+    cell_placement = graph.cell_placement(terrain, start.placement)
     lifts = np.zeros(2, dtype=np.int64)
     stands = np.flatnonzero(graph.stands[start.frame])
     blocks = graph.blocks_under(terrain, [start.frame], start.placement[None])[0, stands]
     if (blocks < 0).any():
         raise UsageError("the start stands beside the grid; start_on_terrain gives one that does")
     if len(stands):
-        lift = terrain.levels[tuple(blocks.T)] - graph.levels[start.frame, stands] - place[2]
+        lift = terrain.levels[tuple(blocks.T)] - graph.levels[start.frame, stands]
+        lift = lift - cell_placement[2]
         # A foot in the air has the lift of the other one.
         lifts[:] = lift[0]
         lifts[stands] = lift
-    settings = np.zeros(kernel.SETTINGS)
-    settings[kernel.PACE], settings[kernel.STRAY] = config.pace, config.stray
-    settings[kernel.JUMP], settings[kernel.HURRY] = config.jump, config.hurry
-    settings[kernel.HASTE], settings[kernel.FACING] = config.haste_s, config.facing
-    settings[kernel.STRETCH], settings[kernel.ADAPT] = config.stretch, config.adapt
-    settings[kernel.DRAW], settings[kernel.REACH] = config.draw, config.draw_m
-    settings[kernel.AHEAD], settings[kernel.FARTHEST] = config.ahead_m, config.farthest_m
-    settings[kernel.SPACING], settings[kernel.BLOCK] = _SPACING, terrain.block_m
-    settings[kernel.FRAME_TIME] = 1.0 / graph.graph.database.fps
-    settings[kernel.ARRIVAL] = config.arrival_m
-    settings[kernel.WINDOW] = np.ceil(window_m(graph.graph.database.fps) / _SPACING)
-    over = graph.over + config.edge_m
-    over.flags.writeable = False
-    return (
-        np.concatenate([place, lifts]),
-        (graph.stands, graph.blocks, graph.levels, over),
-        settings,
-    )
+    return np.concatenate([cell_placement, lifts])
 
 
 def _walk(
@@ -381,6 +317,7 @@ def _walk(
     taken_back: int,
     began: float,
 ) -> TerrainWalk:
+    """A walk from its frames (k,) and placements (k, 4); see `TerrainWalk`."""
     played = frames.astype(np.int32)
     blocks = graph.blocks_under(terrain, played, placements)
     stands = blocks[..., 0] >= 0

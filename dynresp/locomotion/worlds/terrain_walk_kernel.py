@@ -1,18 +1,20 @@
-"""The compiled search for ways over blocks on which every foot stands.
+"""The compiled search for walks over blocks on which every foot stands.
 
 Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
 is used.
 
-A clip lies on the grid in whole blocks, whole levels and quarter turns, so where it is put is four
-whole numbers: column, row, level, quarter turns. A foot that stands is a block and a level; the
-level of the block that it comes to, less its own, is its lift. On the blocks that were recorded all
-lifts are alike. A state is a frame with its placement and the lift of the last stance of each foot.
+A clip is placed in whole blocks, whole levels and quarter turns. So a cell placement is four whole
+numbers: column, row, level, quarter turns. A foot that stands has a block and a recorded level. Its
+lift is the level of the block below it, less its recorded level and that of the placement. On the
+recorded blocks all lifts are equal. A state of the search is a frame, the cell placement of its
+clip and the lift of the last stance of each foot.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -22,33 +24,128 @@ from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
 from dynresp.support.compiling import compiled, helper
 from dynresp.support.growing_kernel import doubled
 
-(
-    PACE, STRAY, JUMP, HASTE, HURRY, STRETCH, DRAW, FACING, AHEAD, FARTHEST,
-    ADAPT, REACH, SPACING, FRAME_TIME, BLOCK, ARRIVAL, GREED, WINDOW, SETTINGS,
-) = range(19)  # fmt: skip
-"""Entries of `settings`, and how many there are."""
+# Eq. 8: c, and how far ahead on the path the point is that the avatar should face [m].
+_FACING, _AHEAD_M = 0.2, 0.6
+# Cost of a second [m]. At a distance d from a path a second costs 1 + _STRAY d^2 times as much
+# [1/m^2]; states farther from it than _MAX_OFF_PATH_M [m] are dropped.
+_PACE, _STRAY, _MAX_OFF_PATH_M = 0.1, 2.0, 2.0
+# Cost of a jump for each unit of its distance (eq. 2) [m]. A jump right after another costs _HURRY
+# more [m]; that falls to 0 over _HURRY_S [s].
+_JUMP, _HURRY, _HURRY_S = 1.0, 0.3, 1.0
+# Cost of a stance on another level than recorded, for each squared level [m], and of each metre by
+# which a foot is drawn in from an edge [m].
+_LEVEL_CHANGE, _DRAW = 0.2, 2.0
 
-COLUMN, ROW, LEVEL, TURNS, LEFT, RIGHT, PLACE = range(7)
-"""Entries of a place: where a clip is put, then the lifts of both feet; and how many there are."""
+COLUMN, ROW, LEVEL, TURNS, LEFT, RIGHT, STATE = range(7)
+"""Entries of a state: cell placement of its clip, then the lifts of both feet; and their number."""
 
-# Room for one key: frames, and columns and rows from this far beside the grid.
+# Ranges in a key: columns and rows from -_BESIDE to _WRAP - _BESIDE.
 _WRAP, _BESIDE = 1 << 20, 1 << 10
 
-_FRAMES = types.Array(types.int32, 1, "C", readonly=True)
-_WHOLES = types.Array(types.int64, 1, "C", readonly=True)
-_COSTS = types.Array(types.float32, 1, "C", readonly=True)
-_NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
-_ROWS = types.Array(types.float64, 2, "C", readonly=True)
-_TABLE = types.Array(types.int64, 2, "C", readonly=True)
-_GRAPH = types.Tuple((_WHOLES, _FRAMES, _COSTS, _TABLE))
-_FEET = types.Tuple(
+
+class WalkSettings(NamedTuple):
+    """Limits and units of a search.
+
+    Attributes:
+        max_level_change: Most levels by which a stance may be higher or lower than recorded, seen
+            from the last stance of the other foot.
+        max_draw_m: Largest distance by which a foot is drawn in from an edge [m].
+        arrival_m: Largest distance of the root from the end of the path at arrival [m].
+        spacing_m: Distance of the points of the path [m].
+        block_m: Side of a block [m].
+        frame_s: Time of a frame [s].
+        greed: Weight of eq. 8 against the costs.
+        window: Points of the path that `nearest_on` looks at.
+        budget: Most states to continue.
+    """
+
+    max_level_change: float
+    max_draw_m: float
+    arrival_m: float
+    spacing_m: float
+    block_m: float
+    frame_s: float
+    greed: float
+    window: int
+    budget: int
+
+
+class GraphArrays(NamedTuple):
+    """A motion graph as the search needs it; see `MotionGraph` and `TerrainGraph`. Read-only.
+
+    Attributes:
+        offsets: (n + 1,) int64, where the row of edges of each frame begins.
+        targets: (m,) int32.
+        distances: (m,) float32.
+        moves: (m, 4) int64, cell placement of the target's clip seen from the source's.
+        planar: (n, 3) x, y [m] and yaw [rad] of the roots.
+    """
+
+    offsets: Any
+    targets: Any
+    distances: Any
+    moves: Any
+    planar: Any
+
+
+class FeetArrays(NamedTuple):
+    """How the feet of each frame stand; see `TerrainGraph`. Read-only.
+
+    Attributes:
+        stands: (n, 2) bool.
+        blocks: (n, 2, 2) int64.
+        levels: (n, 2) int64.
+        over: (n, 2, 4) how far the sole reaches over each edge, with the distance to keep [m].
+    """
+
+    stands: Any
+    blocks: Any
+    levels: Any
+    over: Any
+
+
+class FoundWalk(NamedTuple):
+    """What a search found.
+
+    Attributes:
+        frames: (k,) int32, the frames after the start.
+        placements: (k, 4) int64, their cell placements.
+        arrived: Whether it arrived; if not, the frames lead to the state with the least value of
+            eq. 8.
+        looked: Number of states that were continued.
+    """
+
+    frames: Any
+    placements: Any
+    arrived: Any
+    looked: Any
+
+
+_REAL, _INT = types.float64, types.int64
+_WHOLES = types.Array(_INT, 1, "C", readonly=True)
+_ROWS = types.Array(_REAL, 2, "C", readonly=True)
+_TABLE = types.Array(_INT, 2, "C", readonly=True)
+_SETTINGS = types.NamedTuple((*[_REAL] * 7, _INT, _INT), WalkSettings)
+_GRAPH = types.NamedTuple(
+    (
+        _WHOLES,
+        types.Array(types.int32, 1, "C", readonly=True),
+        types.Array(types.float32, 1, "C", readonly=True),
+        _TABLE,
+        _ROWS,
+    ),
+    GraphArrays,
+)
+_FEET = types.NamedTuple(
     (
         types.Array(types.boolean, 2, "C", readonly=True),
-        types.Array(types.int64, 3, "C", readonly=True),
+        types.Array(_INT, 3, "C", readonly=True),
         _TABLE,
-        types.Array(types.float64, 3, "C", readonly=True),
-    )
+        types.Array(_REAL, 3, "C", readonly=True),
+    ),
+    FeetArrays,
 )
+_FOUND = types.NamedTuple((types.int32[::1], _INT[:, ::1], types.boolean, _INT), FoundWalk)
 
 
 @helper
@@ -64,26 +161,27 @@ def _turned(a, b, turns):
 
 
 @helper
-def _moved(place, move, out):
-    """Put a clip where a way leads: its own placement, then the way's, in it."""
+def _moved(state, move, out):
+    """Write the state after an edge: its cell placement, composed with the edge's; same lifts."""
     a, b = move[0], move[1]
-    for _ in range(place[TURNS]):
+    for _ in range(state[TURNS]):
         a, b = -b, a
-    out[COLUMN], out[ROW] = place[COLUMN] + a, place[ROW] + b
-    out[LEVEL] = place[LEVEL] + move[2]
-    out[TURNS] = (place[TURNS] + move[3]) % 4
-    out[LEFT], out[RIGHT] = place[LEFT], place[RIGHT]
+    out[COLUMN], out[ROW] = state[COLUMN] + a, state[ROW] + b
+    out[LEVEL] = state[LEVEL] + move[2]
+    out[TURNS] = (state[TURNS] + move[3]) % 4
+    out[LEFT], out[RIGHT] = state[LEFT], state[RIGHT]
 
 
 @helper
-def _block(cells, frame, foot, place):
+def _block(blocks, frame, foot, state):
     """Column and row of the block on which a foot stands."""
-    a, b = _turned(cells[frame, foot, 0], cells[frame, foot, 1], place[TURNS])
-    return a + place[COLUMN], b + place[ROW]
+    a, b = _turned(blocks[frame, foot, 0], blocks[frame, foot, 1], state[TURNS])
+    return a + state[COLUMN], b + state[ROW]
 
 
 @helper
 def _level_at(grid, a, b, otherwise):
+    """Level of a block, or another number beside the grid."""
     if 0 <= a < grid.shape[0] and 0 <= b < grid.shape[1]:
         return grid[a, b]
     return otherwise
@@ -110,168 +208,162 @@ def _drawn(grid, a, b, over, turns):
 
 
 @helper
-def _stand(grid, feet, entry, left, before, place, settings):
-    """Go from a frame to the next.
+def _stand(grid, feet, entry, source, before, state, settings):
+    """Check and cost the stances that begin as the walk goes from a frame to the next.
 
     Args:
-        grid: Levels of the blocks.
-        feet: How feet stand: `stands`, `blocks`, `levels` and `over` of `TerrainGraph`.
-        entry: The frame entered.
-        left: The frame left.
-        before: Its place.
-        place: The place of the frame entered; its lifts are those of the frame left, and are
-            brought up to the one entered.
-        settings: See `SETTINGS`.
+        grid: (columns, rows) levels of the blocks.
+        feet: How feet stand.
+        entry: The next frame.
+        source: The frame before it.
+        before: (6,) state of that frame.
+        state: (6,) in and out, the next state with the lifts of the one before; the lifts of
+            stances that begin are set.
+        settings: Limits.
 
     Returns:
-        What the stances that begin cost [m], infinite where a foot does not stand.
+        Cost of the stances that begin [m], infinite where a foot cannot stand.
     """
-    stands, cells, levels, over = feet
+    stands, levels = feet.stands, feet.levels
     cost = 0.0
     for foot in range(2):
-        goes_on = stands[left, foot]
-        if not stands[entry, foot] or (goes_on and entry == left + 1):
+        goes_on = stands[source, foot]
+        if not stands[entry, foot] or (goes_on and entry == source + 1):
             continue
-        a, b = _block(cells, entry, foot, place)
+        a, b = _block(feet.blocks, entry, foot, state)
         if not (0 <= a < grid.shape[0] and 0 <= b < grid.shape[1]):
             return math.inf
-        lift = grid[a, b] - levels[entry, foot] - place[LEVEL]
+        lift = grid[a, b] - levels[entry, foot] - state[LEVEL]
         if goes_on:
             # A jump: the foot stays on its block.
-            old_a, old_b = _block(cells, left, foot, before)
+            old_a, old_b = _block(feet.blocks, source, foot, before)
             if old_a != a or old_b != b:
                 return math.inf
-            change = lift - place[LEFT + foot]
+            change = lift - state[LEFT + foot]
         else:
-            change = lift - place[RIGHT - foot]
-        if abs(change) > settings[ADAPT]:
+            change = lift - state[RIGHT - foot]
+        if abs(change) > settings.max_level_change:
             return math.inf
-        draw = _drawn(grid, a, b, over[entry, foot], place[TURNS])
-        if draw > settings[REACH]:
+        draw = _drawn(grid, a, b, feet.over[entry, foot], state[TURNS])
+        if draw > settings.max_draw_m:
             return math.inf
-        cost += settings[STRETCH] * change * change + settings[DRAW] * draw
-        place[LEFT + foot] = lift
+        cost += _LEVEL_CHANGE * change * change + _DRAW * draw
+        state[LEFT + foot] = lift
     return cost
 
 
 @helper
-def _root(planar, frame, place, block):
-    """Where the root is: x, y and yaw."""
+def _root(planar, frame, state, block):
+    """Where the root is: x, y [m] and yaw [rad]; `block` is the side of a block [m]."""
     x, y = planar[frame, 0], planar[frame, 1]
-    for _ in range(place[TURNS]):
+    for _ in range(state[TURNS]):
         x, y = -y, x
-    yaw = planar[frame, 2] + 0.5 * math.pi * place[TURNS]
-    return x + block * place[COLUMN], y + block * place[ROW], yaw
+    yaw = planar[frame, 2] + 0.5 * math.pi * state[TURNS]
+    return x + block * state[COLUMN], y + block * state[ROW], yaw
 
 
 @helper
-def _value(path, x, y, yaw, progress, away, settings):
+def _value(path, x, y, yaw, progress, away, spacing):
     """Eq. 8 to the end of the path [m]."""
     return eq_8(
         path, x, y, math.cos(yaw), math.sin(yaw), progress, len(path) - 1.0, away,
-        settings[AHEAD], settings[FACING], settings[SPACING],
+        _AHEAD_M, _FACING, spacing,
     )  # fmt: skip
 
 
 @helper
-def _key(frame, place):
-    """One number for a frame and where on the grid its clip is put."""
-    key = np.int64(frame) * 4 + place[TURNS]
-    key = key * _WRAP + place[COLUMN] + _BESIDE
-    return key * _WRAP + place[ROW] + _BESIDE
+def _key(frame, state):
+    """One number for a frame and the column, row and turns of its clip."""
+    key = np.int64(frame) * 4 + state[TURNS]
+    key = key * _WRAP + state[COLUMN] + _BESIDE
+    return key * _WRAP + state[ROW] + _BESIDE
 
 
-@compiled(
-    types.Tuple((types.int32[::1], types.int64[:, ::1]))(
-        types.int64, _WHOLES, _NUMBERS, _ROWS, types.int64, _GRAPH, _ROWS, _FEET, _TABLE,
-        types.int64[::1],
-    )
-)  # fmt: skip
-def search_kernel(start, begin, settings, path, budget, graph, planar, feet, grid, told):
-    """Find a way along a path.
+@helper
+def _trace(frames, parents, states, node):
+    """Frames (k,) from the start to a node, without the start, and their placements (k, 4)."""
+    length, ancestor = 0, node
+    while ancestor > 0:
+        length, ancestor = length + 1, parents[ancestor]
+    out, placements = np.empty(length, np.int32), np.empty((length, 4), np.int64)
+    for at in range(length - 1, -1, -1):
+        out[at], placements[at] = frames[node], states[node, :LEFT]
+        node = parents[node]
+    return out, placements
+
+
+@compiled(_FOUND(_INT, _WHOLES, _ROWS, _SETTINGS, _GRAPH, _FEET, _TABLE))
+def search_kernel(start, begin, path, settings, graph, feet, grid):
+    """Find a walk along a path, or to a goal.
 
     Args:
-        start: The frame it begins at.
-        begin: (6,) its place.
-        settings: See `SETTINGS`.
-        path: (p, 2) points SPACING apart, or the goal alone [m], from the grid's corner.
-        budget: Most states to go on from.
-        graph: Offsets, targets, distances and moves (m, 4) of the graph.
-        planar: (n, 3) x, y and yaw of the roots.
-        feet: See `_stand`.
-        grid: Levels of the blocks.
-        told: Out: whether it arrived, and the states gone on from.
-
-    Returns:
-        (k,) frames after the start, and (k, 4) their placements.
+        start: Frame at which it begins.
+        begin: (6,) state at which it begins; see `COLUMN`.
+        path: (p, 2) points of the path, or the goal alone, from the grid's corner [m].
+        settings: Limits and units.
+        graph: The graph.
+        feet: How its feet stand.
+        grid: (columns, rows) levels of the blocks.
     """
-    offsets, targets, distances, moves = graph
-    last = len(path) - 1
+    offsets, planar = graph.offsets, graph.planar
+    last, spacing = len(path) - 1, settings.spacing_m
     room = 1 << 14
     frames, parents = np.empty(room, np.int32), np.empty(room, np.int64)
-    places, ages = np.empty((room, PLACE), np.int64), np.empty(room, np.int64)
+    states, ages = np.empty((room, STATE), np.int64), np.empty(room, np.int64)
     costs, done = np.empty(room), np.empty(room)
     best = Dict.empty(types.int64, types.float64)
     frames[0], parents[0], ages[0], costs[0] = start, -1, 1 << 20, 0.0
-    places[0] = begin
-    x, y, yaw = _root(planar, start, begin, settings[BLOCK])
-    done[0], away = nearest_on(path, x, y, 0.0, settings[WINDOW])
-    least = _value(path, x, y, yaw, done[0], away, settings)
+    states[0] = begin
+    x, y, yaw = _root(planar, start, begin, settings.block_m)
+    done[0], away = nearest_on(path, x, y, 0.0, settings.window)
+    least = _value(path, x, y, yaw, done[0], away, spacing)
     best[_key(start, begin)] = 0.0
     heap = [(least, np.int64(0))]
     count, nearest, looked, arrived = 1, np.int64(0), 0, False
-    place = np.empty(PLACE, np.int64)
-    while len(heap) > 0 and looked < budget and not arrived:
+    state = np.empty(STATE, np.int64)
+    while len(heap) > 0 and looked < settings.budget and not arrived:
         _, node = heapq.heappop(heap)
         frame = frames[node]
-        if costs[node] > best[_key(frame, places[node])]:
+        if costs[node] > best[_key(frame, states[node])]:
             continue
         looked += 1
-        for way in range(offsets[frame], offsets[frame + 1]):
-            entry = targets[way]
-            _moved(places[node], moves[way], place)
-            cost = _stand(grid, feet, entry, frame, places[node], place, settings)
+        for edge in range(offsets[frame], offsets[frame + 1]):
+            entry = graph.targets[edge]
+            _moved(states[node], graph.moves[edge], state)
+            cost = _stand(grid, feet, entry, frame, states[node], state, settings)
             if cost == math.inf:
                 continue
             age = ages[node] + 1
             if entry != frame + 1:
-                soon = max(0.0, 1.0 - age * settings[FRAME_TIME] / settings[HASTE])
-                cost += settings[JUMP] * distances[way] + settings[HURRY] * soon
+                soon = max(0.0, 1.0 - age * settings.frame_s / _HURRY_S)
+                cost += _JUMP * graph.distances[edge] + _HURRY * soon
                 age = 0
-            x, y, yaw = _root(planar, entry, place, settings[BLOCK])
-            progress, away = nearest_on(path, x, y, done[node], settings[WINDOW])
+            x, y, yaw = _root(planar, entry, state, settings.block_m)
+            progress, away = nearest_on(path, x, y, done[node], settings.window)
             stray = 0.0
             if last > 0:
-                if away > settings[FARTHEST]:
+                if away > _MAX_OFF_PATH_M:
                     continue
-                stray = settings[STRAY] * away * away
-            cost += costs[node] + settings[PACE] * settings[FRAME_TIME] * (1.0 + stray)
-            key = _key(entry, place)
+                stray = _STRAY * away * away
+            cost += costs[node] + _PACE * settings.frame_s * (1.0 + stray)
+            key = _key(entry, state)
             if key in best and best[key] <= cost:
                 continue
             best[key] = cost
-            value = _value(path, x, y, yaw, progress, away, settings)
+            value = _value(path, x, y, yaw, progress, away, spacing)
             if count == room:
                 room *= 2
                 frames, parents, ages = doubled(frames), doubled(parents), doubled(ages)
-                costs, done, places = doubled(costs), doubled(done), doubled(places)
+                costs, done, states = doubled(costs), doubled(done), doubled(states)
             frames[count], parents[count], ages[count] = entry, node, age
-            places[count], costs[count], done[count] = place, cost, progress
-            near = math.hypot(x - path[last, 0], y - path[last, 1]) <= settings[ARRIVAL]
-            arrived = near and progress >= last - settings[ARRIVAL] / settings[SPACING]
+            states[count], costs[count], done[count] = state, cost, progress
+            near = math.hypot(x - path[last, 0], y - path[last, 1]) <= settings.arrival_m
+            arrived = near and progress >= last - settings.arrival_m / spacing
             if value < least or arrived:
                 least, nearest = value, np.int64(count)
-            heapq.heappush(heap, (cost + settings[GREED] * value, np.int64(count)))
+            heapq.heappush(heap, (cost + settings.greed * value, np.int64(count)))
             count += 1
             if arrived:
                 break
-    told[0], told[1] = arrived, looked
-    length, node = 0, nearest
-    while node > 0:
-        length, node = length + 1, parents[node]
-    out, where = np.empty(length, np.int32), np.empty((length, 4), np.int64)
-    node = nearest
-    for at in range(length - 1, -1, -1):
-        out[at], where[at] = frames[node], places[node, :LEFT]
-        node = parents[node]
-    return out, where
+    walked, placements = _trace(frames, parents, states, nearest)
+    return FoundWalk(walked, placements, arrived, looked)

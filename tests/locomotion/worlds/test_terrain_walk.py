@@ -7,6 +7,7 @@ from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.avatar_state import AvatarState
+from dynresp.locomotion.worlds import terrain_walk
 from dynresp.locomotion.worlds.paths import distances_to
 from dynresp.locomotion.worlds.recorded_terrain import onto_blocks
 from dynresp.locomotion.worlds.terrain import BLOCK_M, LEVEL_M, Terrain
@@ -19,7 +20,6 @@ from dynresp.locomotion.worlds.terrain_fitting import (
 from dynresp.locomotion.worlds.terrain_graph import TerrainGraph
 from dynresp.locomotion.worlds.terrain_walk import (
     TerrainWalk,
-    TerrainWalkConfig,
     follow_on_terrain,
     reach_on_terrain,
     start_on_terrain,
@@ -63,13 +63,13 @@ def made(character: Character) -> TerrainGraph:
 
 
 def check_walk(graph: TerrainGraph, terrain: Terrain, walk: TerrainWalk, adapt: int) -> None:
-    """A walk goes along ways of the graph, and all its feet stand on blocks."""
-    ways, database = graph.graph, graph.graph.database
+    """A walk follows edges of the graph, and all its feet stand on blocks."""
+    edges, database = graph.graph, graph.graph.database
     for k in range(1, len(walk.frames)):
         left, entry = walk.frames[k - 1], walk.frames[k]
-        row = slice(ways.offsets[left], ways.offsets[left + 1])
-        way = row.start + int(np.flatnonzero(ways.targets[row] == entry)[0])
-        there = placement.compose(walk.placements[k - 1], ways.placements[way])
+        row = slice(edges.offsets[left], edges.offsets[left + 1])
+        edge = row.start + int(np.flatnonzero(edges.targets[row] == entry)[0])
+        there = placement.compose(walk.placements[k - 1], edges.placements[edge])
         off = there - walk.placements[k]
         off[3] = placement.wrapped(off[3])
         assert np.abs(off[[0, 1, 3]]).max() < 1e-9
@@ -83,7 +83,7 @@ def check_walk(graph: TerrainGraph, terrain: Terrain, walk: TerrainWalk, adapt: 
     assert np.abs(lift).max() <= adapt
 
 
-def test_layout_tells_the_blocks_that_were_walked_on(made: TerrainGraph) -> None:
+def test_a_graph_knows_the_blocks_of_its_stances(made: TerrainGraph) -> None:
     recorded = Terrain(LEVELS)
     original = ~np.array([clip.identity.endswith("m") for clip in made.graph.database.clips])
     mine = original[made.graph.database.clip_of][:, None] & made.stands
@@ -93,16 +93,20 @@ def test_layout_tells_the_blocks_that_were_walked_on(made: TerrainGraph) -> None
     assert (recorded.cells(soles[mine].mean(axis=1)) == cells).all()
 
 
-def test_places_come_back(made: TerrainGraph, rng: np.random.Generator) -> None:
+def test_cell_placements_convert_to_metres_and_back(
+    made: TerrainGraph, rng: np.random.Generator
+) -> None:
     terrain = Terrain(LEVELS, corner=(0.3, -7.1))
     for _ in range(20):
-        place = rng.integers([-5, -5, -9, 0], [9, 9, 9, 4])
-        assert (made.place(terrain, made.meters(terrain, place)) == place).all()
+        given = rng.integers([-5, -5, -9, 0], [9, 9, 9, 4])
+        assert (made.cell_placement(terrain, made.meters(terrain, given)) == given).all()
     with pytest.raises(UsageError, match="whole blocks"):
-        made.place(terrain, np.zeros(4))
+        made.cell_placement(terrain, np.zeros(4))
 
 
-def test_other_worlds_are_refused(made: TerrainGraph, character: Character) -> None:
+def test_other_coordinates_blocks_and_places_are_refused(
+    made: TerrainGraph, character: Character
+) -> None:
     motion = stiff_walk(character, 3, 60)
     flat = MotionGraph.build([motion], GraphConfig(contact_change=False, sigma=0.1))
     with pytest.raises(UsageError, match="blocks coordinates"):
@@ -127,40 +131,37 @@ def test_other_worlds_are_refused(made: TerrainGraph, character: Character) -> N
         start_on_terrain(made, terrain, [-9.0, -9.0], [0.0, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("facing", 1.0), ("adapt", -1), ("budget", 0), ("haste_s", 0.0)]
-)
-def test_numbers_that_make_no_sense_are_refused(name: str, value: float) -> None:
-    with pytest.raises(UsageError, match=name):
-        TerrainWalkConfig(**{name: value})
-
-
 @pytest.mark.parametrize("seed", range(4))
-def test_search_reaches_what_can_be_reached(made: TerrainGraph, seed: int) -> None:
+def test_the_search_reaches_a_goal_exactly_if_its_slow_twin_does(
+    made: TerrainGraph, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The slow twin takes recorded steps alone, and draws no foot in.
+    monkeypatch.setattr(terrain_walk, "_MAX_LEVEL_CHANGE", 0)
+    monkeypatch.setattr(terrain_walk, "_MAX_DRAW_M", 10.0)
+    monkeypatch.setattr(terrain_walk, "_ARRIVAL_M", 0.15)
     rng = np.random.default_rng(seed)
     terrain = Terrain(rng.integers(0, 3, size=(5, 5)), corner=(-1.0, 2.0))
     middle = np.array(terrain.corner) + 2.5 * BLOCK_M
-    config = TerrainWalkConfig(adapt=0, draw_m=10.0, arrival_m=0.15)
     states = []
     for frame in made.graph.frames[:: len(made.graph.frames) // 40]:
         for turns in range(4):
             cell = rng.integers(-2, 3, size=2)
-            place = made.standing(terrain, int(frame), cell, turns)
-            if place is not None and made.stands[frame].any():
-                states.append(AvatarState(int(frame), made.meters(terrain, place)))
+            found = made.standing(terrain, int(frame), cell, turns)
+            if found is not None and made.stands[frame].any():
+                states.append(AvatarState(int(frame), made.meters(terrain, found)))
     assert states
     state = states[rng.integers(len(states))]
     roots = np.array(slow.reachable(made, terrain, state))
     for goal in middle + rng.uniform(-1.4, 1.4, size=(8, 2)):
         nearest = np.hypot(*(roots[:, :2] - goal).T).min()
-        walk = reach_on_terrain(made, terrain, state, goal, config)
-        assert walk.arrived == (nearest <= config.arrival_m)
+        walk = reach_on_terrain(made, terrain, state, goal)
+        assert walk.arrived == (nearest <= 0.15)
         check_walk(made, terrain, walk, adapt=0)
         if walk.arrived:
-            assert walk.off_goal <= config.arrival_m
+            assert walk.off_goal <= 0.15
 
 
-def test_walks_are_on_blocks_and_end_where_they_should(made: TerrainGraph) -> None:
+def test_walks_stand_on_blocks_and_end_at_the_goal(made: TerrainGraph) -> None:
     terrain = Terrain.random(np.random.default_rng(4), 12, 12, highest=3, steepest=1)
     start = start_on_terrain(made, terrain, [2.0, 2.0], [5.0, 5.0])
     assert np.hypot(*(start.root(made.graph)[:2] - 2.0)) < 0.6
@@ -181,7 +182,7 @@ def test_walks_are_on_blocks_and_end_where_they_should(made: TerrainGraph) -> No
     )
 
 
-def test_wandering_goes_on_and_says_where_it_cannot(made: TerrainGraph) -> None:
+def test_a_random_walk_goes_on_or_reports_that_it_is_stuck(made: TerrainGraph) -> None:
     terrain = Terrain.random(np.random.default_rng(4), 12, 12, highest=3, steepest=1)
     start = start_on_terrain(made, terrain, [2.0, 2.0], [5.0, 5.0])
     walk = wander_on_terrain(made, terrain, start, 400, np.random.default_rng(1))
@@ -209,7 +210,7 @@ def test_soles_are_drawn_in_only_where_the_height_changes() -> None:
     assert not drawn_in(terrain, block, inside, 0.01).any()
     assert not drawn_in(terrain, block, level, 0.01).any()
     shift = drawn_in(terrain, block, across, 0.01)
-    # The corner block alone is higher: the shorter way out suffices.
+    # The corner block alone is higher: the shorter shift is enough.
     assert np.count_nonzero(shift) == 1
     assert shift[1] == pytest.approx(2.0 * BLOCK_M - 0.01 - across[:, 1].max())
     step = Terrain(np.array([[0, 0, 0], [0, 0, 3], [0, 0, 0]]))
@@ -231,7 +232,7 @@ def test_feet_of_the_motion_stand_on_the_blocks(made: TerrainGraph) -> None:
         assert np.percentile(feet.sunk, 99) < 0.02
 
 
-def test_footing_tells_what_is_wrong(character: Character) -> None:
+def test_footing_measures_height_overhang_and_depth(character: Character) -> None:
     """A figure beside its block, over the edge, and in the next one."""
     poses = np.repeat(character.rest_pose[None], 3, axis=0)
     low = sole_corners(character, character.kinematics(poses))[..., 2].min()
