@@ -1,4 +1,4 @@
-"""`[settings]`: settings of physics, search and blend, and what `result.json` says of them."""
+"""`[settings]` of a spec: physics, search and blend; and what `result.json` says about them."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Annotated, Any
 
-from dynresp.response.response import ResponseConfig
+from dynresp.response.response import CARRY_ON_EXIT_S, CARRY_ON_SLACK_S, ResponseConfig
 from dynresp.specs.shared_tables import Strict
 from dynresp.specs.values import fixed, whole
 from dynresp.support.errors import SpecError, UsageError
 
 
 class SettingsTable(Strict):
-    """`[settings]`: how simulation, search and blend run; what is left out keeps its default."""
+    """`[settings]`: simulation, search and blend; a key that is left out keeps its default."""
 
     blend_s: Annotated[float | None, fixed(0.05, 2.0, "s")] = None
     second_pass: bool | None = None
@@ -30,8 +30,8 @@ class SettingsTable(Strict):
     substeps: Annotated[int | None, whole(4, 100)] = None
 
 
-# Where each key goes: the part of `ResponseConfig`, "" for the whole, and the name there.
-_PLACES = {
+# For each key the part of `ResponseConfig` with the setting ("" for itself), and its name there.
+_FIELDS = {
     "blend_s": ("transition", "blend_s"),
     "second_pass": ("transition", "second_pass"),
     "window_s": ("window", "window_s"),
@@ -48,7 +48,7 @@ _PLACES = {
 
 
 def response_config(settings: SettingsTable) -> ResponseConfig:
-    """Settings of an experiment over the defaults.
+    """The defaults, with the settings of an experiment in their place.
 
     Raises:
         SpecError: They contradict each other.
@@ -57,21 +57,21 @@ def response_config(settings: SettingsTable) -> ResponseConfig:
     given = settings.model_dump(exclude_none=True)
     try:
         for part in ("transition", "window", "physics"):
-            own = {_PLACES[k][1]: v for k, v in given.items() if _PLACES[k][0] == part}
+            own = {_FIELDS[k][1]: v for k, v in given.items() if _FIELDS[k][0] == part}
             config = replace(config, **{part: replace(getattr(config, part), **own)})
-        own = {_PLACES[k][1]: v for k, v in given.items() if not _PLACES[k][0]}
+        own = {_FIELDS[k][1]: v for k, v in given.items() if not _FIELDS[k][0]}
         return replace(config, **own)
     except UsageError as error:
         raise SpecError(f"settings.{error}") from None
 
 
 def settings_record(config: ResponseConfig) -> dict[str, Any]:
-    """What `result.json` says of the settings: every key of `[settings]`, given or not.
+    """What `result.json` says about the settings: every key of `[settings]`, given or not.
 
-    `fixed` holds what an experiment file cannot set.
+    `fixed` has what an experiment file cannot set.
     """
     record = {}
-    for key, (part, name) in _PLACES.items():
+    for key, (part, name) in _FIELDS.items():
         record[key] = getattr(getattr(config, part) if part else config, name)
     servo = {item.name: getattr(config.physics.servo, item.name)
              for item in fields(config.physics.servo)}  # fmt: skip
@@ -79,8 +79,8 @@ def settings_record(config: ResponseConfig) -> dict[str, Any]:
         **record,
         "fixed": {
             "fps": config.physics.fps,
-            "carry_on_exit_s": config.carry_on_exit_s,
-            "carry_on_slack_s": config.carry_on_slack_s,
+            "carry_on_exit_s": CARRY_ON_EXIT_S,
+            "carry_on_slack_s": CARRY_ON_SLACK_S,
             "position_weight": config.window.position_weight,
             "angle_weight_m": config.window.angle_weight,
             "servo": {k: dict(v) if isinstance(v, Mapping) else v for k, v in servo.items()},

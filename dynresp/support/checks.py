@@ -22,6 +22,8 @@ def check_number(
     high: float = LARGEST,
     unit: str = "",
     whole: bool = False,
+    *,
+    above_low: bool = False,
 ) -> None:
     """Refuse what is not a finite number, or is out of range.
 
@@ -32,6 +34,7 @@ def check_number(
         high: The largest.
         unit: Unit of the number, for the message.
         whole: Whether it must be a whole number.
+        above_low: Whether `low` itself is refused, too.
 
     Raises:
         UsageError: It is not such a number; the message says what was given and expected.
@@ -44,10 +47,18 @@ def check_number(
     except OverflowError:
         number = math.inf
     # NaN fails this, too.
-    if not low <= number <= high:
-        limits = f"from {low:g} to {high:g}" if high < LARGEST else f"{low:g} or more, and finite"
-        limits = limits if low > -LARGEST else "finite"
-        raise UsageError(f"{name} must be {limits}{unit and f' {unit}'}, got {_shown(str, value)}")
+    if not low <= number <= high or (above_low and number == low):
+        unit = unit and f" {unit}"
+        if low <= -LARGEST:
+            limits = "finite"
+        elif above_low:
+            most = f"at most {high:g}{unit}" if high < LARGEST else "finite"
+            limits = f"above {low:g}{unit}, and {most}"
+        elif high < LARGEST:
+            limits = f"from {low:g} to {high:g}{unit}"
+        else:
+            limits = f"{low:g}{unit} or more, and finite"
+        raise UsageError(f"{name} must be {limits}, got {_shown(str, value)}")
 
 
 def check_numbers(settings: Any) -> None:

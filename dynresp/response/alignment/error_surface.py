@@ -1,4 +1,4 @@
-"""The landscape in which a response was aligned (Zordan et al. 2007, colour plate 2)."""
+"""Mismatches of a response's choice for all exits and entries (as Zordan et al. 2007, plate 2)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ import numpy.typing as npt
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.look_ahead import base_poses
-from dynresp.response.response import CARRY_ON, Response, ResponseConfig
+from dynresp.response.response import (
+    CARRY_ON,
+    CARRY_ON_SLACK_S,
+    Response,
+    ResponseConfig,
+)
 from dynresp.response.search.full_search import search
 from dynresp.response.search.full_search_choice import entry_range
 from dynresp.response.windows.windows import ReactionTrack, library_windows, trace_windows
@@ -19,12 +24,12 @@ from dynresp.support.errors import MotionError
 
 @dataclass(frozen=True)
 class AlignmentSurface:
-    """Window errors of what was chosen, for all exits and entries.
+    """Mismatches (window errors) of what was chosen, for all exits and entries.
 
     Attributes:
         errors: (exits, entries) [m].
         exits_s: (exits,) after contact [s].
-        entries_s: (entries,) in the reaction's clip, or in the base motion [s].
+        entries_s: (entries,) time in the reaction's clip, or in the base motion [s].
     """
 
     errors: npt.NDArray[np.float32]
@@ -35,10 +40,10 @@ class AlignmentSurface:
 def alignment_surface(
     response: Response, character: Character, config: ResponseConfig
 ) -> AlignmentSurface:
-    """Search everything that the choice of a response could have been aligned to.
+    """Compute the mismatch at all exits and entries that the alignment could have taken.
 
     Args:
-        response: It; one with a choice.
+        response: A response with a choice.
         character: Its character.
         config: Its settings.
 
@@ -47,16 +52,18 @@ def alignment_surface(
     """
     seen, entered, entry = response.look_ahead_states, response.entered_motion, response.entry
     if seen is None or entered is None or entry is None or response.choice is None:
-        raise MotionError("nothing was chosen, so there is nothing to align")
+        raise MotionError(
+            "nothing was chosen, so there is nothing to align; expected a response to a hit"
+        )
     assert response.contact_frame is not None
     window, fps = config.window, config.physics.fps
     if response.choice == CARRY_ON:
-        # By the clock, and somewhat before and after.
-        slack = round(config.carry_on_slack_s * fps)
+        # Where the base motion would be at each exit, and some frames before and after.
+        slack = round(CARRY_ON_SLACK_S * fps)
         first = float(response.contact_frame + window.exit_frames[0] - slack)
         frames = len(window.exit_frames) + 2 * slack + window.window_frames - 1
-        near = response.contact_frame + window.exit_frames[0] - slack + np.arange(frames)
-        poses = base_poses([entered], near[None])[0]
+        base_frames = response.contact_frame + window.exit_frames[0] - slack + np.arange(frames)
+        poses = base_poses([entered], base_frames[None])[0]
         bounds = None
     else:
         first = entry - int(entry)

@@ -1,11 +1,10 @@
-"""The oracle: exhaustive search of all reactions for the best moment to leave the simulation.
+"""The full search (oracle): compares all exits with all entries of all reactions.
 
-Every exit frame of a simulated trace is compared with every entry frame of every reaction by the
-window error of Zordan et al. 2007 (section 5). It labels the training data of the classifier, and
-it is what faster ways of aligning are measured against.
+It compares them by the mismatch (window error) of Zordan et al. 2007 (section 5). It labels the
+training data of the classifier, and faster alignments are measured against it.
 
-Two float32 evaluations of an error agree with exact arithmetic within 1e-4 relative plus
-`ERROR_FLOOR`; two searches of the same windows agree in every bit.
+A mismatch in float32 agrees with exact arithmetic within 1e-4 relative plus `ERROR_FLOOR`; two
+searches of the same windows agree in every bit.
 """
 
 from __future__ import annotations
@@ -19,19 +18,19 @@ from dynresp.response.windows.windows import LANES, LibraryWindows, WindowSet
 from dynresp.support.errors import MotionError
 
 ERROR_FLOOR = 2e-5
-"""Absolute uncertainty of an error [m], for 14 bodies a few metres from the pelvis and weights of
-the order of one: what float32 leaves where two windows are equal."""
+"""Absolute uncertainty of a mismatch [m], for 14 bodies a few metres from the pelvis and weights of
+about one: what float32 leaves where two windows are equal."""
 
 
 @dataclass(frozen=True)
 class Match:
-    """Where a reaction fits the simulation best.
+    """Exit and entry where a reaction fits the simulation best.
 
     Attributes:
         reaction: Name of the reaction.
-        error: Window error [m], weighted and summed over the bodies.
-        exit_frame: Frame of the trace to leave, counted from contact.
-        entry_frame: Frame of the reaction clip to enter.
+        error: Mismatch (window error) [m], weighted and summed over the bodies.
+        exit_frame: Frame of the trace, counted from contact.
+        entry_frame: Frame of the reaction clip.
     """
 
     reaction: str
@@ -42,7 +41,7 @@ class Match:
 
 @dataclass(frozen=True)
 class ErrorSurface:
-    """Window errors of one reaction for all exits and entries.
+    """Mismatches (window errors) of one reaction for all exits and entries.
 
     Attributes:
         errors: (exits, entries) [m], float32.
@@ -57,15 +56,15 @@ class ErrorSurface:
 
 @dataclass(frozen=True)
 class FullSearchResult:
-    """What an exhaustive search found.
+    """What a full search found.
 
     Attributes:
         names: Names of the reactions, in the order of the library.
-        errors: (reactions,) least error of each [m], float32.
-        exit_frames: (reactions,) frame of the trace where it is reached.
-        entry_frames: (reactions,) frame of the reaction clip where it is reached.
-        trace: The windows that were searched with.
-        library: The windows that were searched.
+        errors: (reactions,) least mismatch of each [m], float32.
+        exit_frames: (reactions,) its exit, a frame of the trace.
+        entry_frames: (reactions,) its entry, a frame of the reaction clip.
+        trace: Windows of the simulated trace.
+        library: Windows of the reactions.
     """
 
     names: tuple[str, ...]
@@ -79,8 +78,7 @@ class FullSearchResult:
     def best(self) -> Match:
         """The best of all reactions.
 
-        Of equal errors the lowest exit frame wins, then the lowest entry frame, then the first
-        reaction.
+        Of equal mismatches the lowest exit wins, then the lowest entry, then the first reaction.
         """
         return self._match(int(np.lexsort((self.entry_frames, self.exit_frames, self.errors))[0]))
 
@@ -93,7 +91,7 @@ class FullSearchResult:
         return self._match(self.library.index(reaction))
 
     def surface(self, reaction: str) -> ErrorSurface:
-        """All errors of one reaction, computed when asked for.
+        """Compute all mismatches of one reaction.
 
         Raises:
             UnknownNameError: There is no such reaction.
@@ -119,28 +117,26 @@ def search(
 
     Args:
         trace: Windows of the simulated trace (`windows.trace_windows`).
-        library: Windows of the reactions (`windows.library_windows`), made with the same
-            configuration.
-        early_stop: Leave out pairs of windows as soon as they can no longer win. The result is the
-            same to the last bit; False is for measuring what every pair costs.
+        library: Windows of the reactions (`windows.library_windows`), cut with the same settings.
+        early_stop: Skip pairs of windows as soon as they can no longer win. The result has the
+            same bits; False is for measuring what all pairs cost.
 
     Returns:
-        The best match of every reaction; of equal errors the lowest exit frame, then the lowest
-        entry frame.
+        The best match of every reaction; of equal mismatches the lowest exit, then the lowest
+        entry.
 
     Raises:
-        MotionError: Trace and library were made with different configurations or differ in their
-            number of bodies.
+        MotionError: Trace and library have different settings or numbers of bodies.
     """
     if trace.config != library.config:
         raise MotionError(
-            f"the trace was cut with {trace.config}, the library with {library.config}. "
-            "Cut both with one configuration."
+            f"the trace was cut with {trace.config}, the library with {library.config}; "
+            "cut both with the same settings"
         )
     if trace.bodies != library.windows[0].bodies:
         raise MotionError(
-            f"the trace has {trace.bodies} bodies, the library {library.windows[0].bodies}. "
-            "Both must be of one character."
+            f"the trace has {trace.bodies} bodies, the library {library.windows[0].bodies}; "
+            "both must be of one character"
         )
     errors, exits, entries, _ = _run(trace, library, early_stop=early_stop)
     starts = [w.starts[at] for w, at in zip(library.windows, entries, strict=True)]
@@ -162,7 +158,7 @@ def _run(
     npt.NDArray[np.int64],
     npt.NDArray[np.float32],
 ]:
-    """Call the kernel: least errors, their exit and entry indices, and its scratch."""
+    """Call the kernel: least mismatches, their exit and entry indices, and its scratch."""
     # numba takes a third of a second to import, the kernel one more when it is first compiled.
     from dynresp.response.windows.window_kernel import search_kernel
 

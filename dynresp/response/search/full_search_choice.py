@@ -1,4 +1,4 @@
-"""The choice of the oracle: all reactions and the base motion searched through."""
+"""Choose by full search (oracle): compare all reactions and the base motion."""
 
 from __future__ import annotations
 
@@ -40,10 +40,7 @@ class FullSearchAnswer:
 def reaction_tracks(
     character: Character, library: ReactionLibrary, config: ResponseConfig
 ) -> list[ReactionTrack]:
-    """Bodies of all reactions, with the frames at which each may be entered.
-
-    From its first frame to `entry_max_s`, as long as enough of it is left then.
-    """
+    """Body states of all reactions, each with its entry range (`entry_range`)."""
     tracks = []
     for reaction in library.reactions:
         states = character.kinematics(reaction.motion.poses)
@@ -53,20 +50,23 @@ def reaction_tracks(
 
 
 def entry_range(frames: int, config: ResponseConfig) -> tuple[int, int]:
-    """Frames [first, last) at which a reaction of so many frames may be entered."""
+    """Entries [first, last) into a reaction of so many frames.
+
+    From the first frame to `entry_max_s`, if `remaining_s`, a blend and a window still follow.
+    """
     fps = config.physics.fps
-    left = round(max(config.remaining_s, config.transition.blend_s + 2 / fps) * fps)
-    left = max(left, config.window.window_frames - 1)
+    remaining = round(max(config.remaining_s, config.transition.blend_s + 2 / fps) * fps)
+    remaining = max(remaining, config.window.window_frames - 1)
     latest = round(config.entry_max_s * fps) + 1
-    return 0, max(1, min(latest, frames - left))
+    return 0, max(1, min(latest, frames - remaining))
 
 
 class FullSearchChooser:
-    """Chooses by exhaustive search (Zordan et al. 2005; 2007, section 4).
+    """Chooses by full search (Zordan et al. 2005; 2007, section 4).
 
-    A graze is carried on through. Else the reaction of the least window error is chosen, unless
-    the base motion, where it must fit, fits better still and well enough
-    (`ResponseConfig.carry_on_max_error`).
+    A graze gets no reaction (carry on). Any other hit gets the reaction of the least mismatch
+    (window error), unless the base motion fits better and its mismatch is at most
+    `ResponseConfig.carry_on_max_error`.
     """
 
     def __init__(
@@ -87,15 +87,18 @@ class FullSearchChooser:
         """Choose for each hit."""
         choices = []
         for base, answer in zip(hits.bases, self.answers(hits), strict=True):
-            best, stay = answer.reactions.best, answer.base_motion
+            best, base_fit = answer.reactions.best, answer.base_motion
             found = zip(answer.reactions.names, answer.reactions.errors, strict=True)
-            errors = {name: float(e) for name, e in found} | {CARRY_ON: stay.error}
+            errors = {name: float(e) for name, e in found} | {CARRY_ON: base_fit.error}
             if answer.carries_on:
-                choice = Choice(CARRY_ON, base, stay.exit, stay.entry, stay.error, errors)
+                choice = Choice(
+                    CARRY_ON, base, base_fit.exit, base_fit.entry, base_fit.error, errors
+                )
             else:
                 motion = self.library.reaction(best.reaction).motion
-                place = (best.exit_frame, best.entry_frame)
-                choice = Choice(best.reaction, motion, *place, best.error, errors)
+                choice = Choice(
+                    best.reaction, motion, best.exit_frame, best.entry_frame, best.error, errors
+                )
             choices.append(choice)
         return choices
 
@@ -104,26 +107,27 @@ class FullSearchChooser:
         if not len(hits):
             return []
         window = self.config.window
-        cuts = make_many_windows(
+        traces = make_many_windows(
             hits.states.centers, hits.states.quaternions, window.exit_frames, window
         )
-        carried = search_base_motions(self.character, self.config, hits)
+        base_fits = search_base_motions(self.character, self.config, hits)
         answers = []
-        for cut, stay, graze in zip(cuts, carried, hits.grazes, strict=True):
-            found = search(cut, self.windows)
+        for trace, base_fit, graze in zip(traces, base_fits, hits.grazes, strict=True):
+            found = search(trace, self.windows)
             limit = min(found.best.error, self.config.carry_on_max_error)
-            answers.append(FullSearchAnswer(found, stay, bool(graze) or stay.error <= limit))
+            carries_on = bool(graze) or base_fit.error <= limit
+            answers.append(FullSearchAnswer(found, base_fit, carries_on))
         return answers
 
 
 def choice_columns(
     answers: list[FullSearchAnswer],
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64], npt.NDArray[np.int64], list[int]]:
-    """What the oracle found for each hit as arrays over all classes, carrying on the last.
+    """What the full search found for each hit, as arrays over all classes; the last is carry on.
 
     Returns:
-        Errors [m], exit frames after contact and entry frames, each (hits, reactions + 1), and
-        the class chosen for each hit. The entry of carrying on counts in the base motion.
+        Mismatches [m], exits in frames after contact and entry frames, each (hits, reactions + 1),
+        and the class chosen for each hit. The entry of carry on is a frame of the base motion.
     """
     errors = [[*a.reactions.errors, a.base_motion.error] for a in answers]
     exits = [[*a.reactions.exit_frames, a.base_motion.exit] for a in answers]

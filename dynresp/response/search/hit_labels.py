@@ -1,4 +1,4 @@
-"""Hits as a classifier learns from them: what can be known early, and what the oracle chose."""
+"""Label hits for training a classifier: their features, and what the full search chose."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from dynresp.response.response import CARRY_ON, ResponseConfig
 from dynresp.response.search.full_search_choice import FullSearchChooser, choice_columns
 
 OUTCOMES = ("hit", "miss", "diverged")
-"""What can come of a hit: contact, none, or a simulation that blew up."""
+"""Outcome of a hit: contact, no contact, or a simulation that diverged."""
 
 
 @dataclass(frozen=True)
 class HitLabels:
-    """Labelled hits, arrays over n of them. Numbers of what was not hit are NaN, indices -1.
+    """Labels of n hits. Where nothing was hit, numbers are NaN and indices -1.
 
     Attributes:
         outcome: (n,) index into `OUTCOMES`.
@@ -34,15 +34,15 @@ class HitLabels:
         contact_body: (n,) index of the body hit.
         contact_force: (n,) in the step of contact; of a push, its peak [N].
         contact_point: (n, 3) world [m].
-        features: (n, features), see `features.FEATURE_NAMES`.
-        label: (n,) class that the oracle chose: a reaction in the order of the library, or after
-            the last to carry on.
+        features: (n, features), see `hit_features.FEATURE_NAMES`.
+        label: (n,) class that the full search chose: index of a reaction in the library, or after
+            the last of them carry on.
         graze: (n,) whether the hit was too light for a reaction.
         speed_change: (n,) of the centre of mass over the ground [m/s].
-        errors: (n, classes) least window error of each class [m].
-        exit_frames: (n, classes) where it is reached, frames after contact.
-        entry_frames: (n, classes) frame of the reaction's clip, or of the base motion after
-            contact.
+        errors: (n, classes) least mismatch (window error) of each class [m].
+        exit_frames: (n, classes) its exit, frames after contact.
+        entry_frames: (n, classes) its entry: frame of the reaction's clip, or of the base motion
+            after contact.
     """
 
     outcome: npt.NDArray[np.int8]
@@ -61,7 +61,7 @@ class HitLabels:
 
 
 class HitLabeller:
-    """Simulates hits and lets the oracle choose.
+    """Simulates hits and lets the full search choose.
 
     Attributes:
         classes: Names of the reactions in the order of the library, then `CARRY_ON`.
@@ -81,7 +81,7 @@ class HitLabeller:
             character: The character.
             library: Its reactions, at the simulation's frame rate.
             config: Settings.
-            threads: Threads for the physics, 0 for all cores.
+            threads: Threads of the simulation, 0 for all cores.
 
         Raises:
             MotionError: A clip of the library is shorter than a window.
@@ -91,7 +91,7 @@ class HitLabeller:
         self.classes = (*(reaction.name for reaction in library.reactions), CARRY_ON)
         self.feature_names = FEATURE_NAMES
         self._stage = HitStage(character, config, threads)
-        self._oracle = FullSearchChooser(character, library, config)
+        self._chooser = FullSearchChooser(character, library, config)
 
     def label(self, hits: Sequence[tuple[Motion, Impact]]) -> HitLabels:
         """Label hits; each is bitwise what it would be alone.
@@ -100,49 +100,49 @@ class HitLabeller:
             hits: Base motions (at the simulation's frame rate) and what hits them.
 
         Raises:
-            SpecError: An impact lies outside its base motion.
+            SpecError: An impact is outside its base motion.
             MotionError: A base motion has another frame rate.
         """
-        labelled = self._empty(len(hits))
+        labels = self._empty(len(hits))
         for batch in self._stage.batches(hits):
             traces = batch.simulation.look_ahead(self.config.horizon_s)
             for row, prepared, trace in zip(batch.rows, batch.prepared, traces, strict=True):
-                self._tell_contact(labelled, row, prepared.start, trace)
-            self._tell_choices(labelled, batch, traces)
-        return labelled
+                self._write_contact(labels, row, prepared.start, trace)
+            self._write_choices(labels, batch, traces)
+        return labels
 
-    def _tell_contact(self, labelled: HitLabels, row: int, start: int, trace: Trace) -> None:
+    def _write_contact(self, labels: HitLabels, row: int, start: int, trace: Trace) -> None:
         if trace.diverged is not None:
-            labelled.outcome[row] = OUTCOMES.index("diverged")
+            labels.outcome[row] = OUTCOMES.index("diverged")
         contact = trace.contact
         if contact is None:
             return
         if trace.diverged is None:
-            labelled.outcome[row] = OUTCOMES.index("hit")
-        labelled.contact_time_s[row] = start / self.config.physics.fps + contact.time_s
-        labelled.contact_frame[row] = start + contact.frame
-        labelled.contact_body[row] = self.character.body(contact.body)
-        labelled.contact_force[row] = contact.force
-        labelled.contact_point[row] = contact.point
+            labels.outcome[row] = OUTCOMES.index("hit")
+        labels.contact_time_s[row] = start / self.config.physics.fps + contact.time_s
+        labels.contact_frame[row] = start + contact.frame
+        labels.contact_body[row] = self.character.body(contact.body)
+        labels.contact_force[row] = contact.force
+        labels.contact_point[row] = contact.point
 
-    def _tell_choices(self, labelled: HitLabels, batch: HitBatch, traces: Sequence[Trace]) -> None:
+    def _write_choices(self, labels: HitLabels, batch: HitBatch, traces: Sequence[Trace]) -> None:
         seen = look_ahead_of(self.character, self.config, batch.bases, batch.prepared, traces)
         if not len(seen):
             return
         rows = np.array(batch.rows)[seen.rows]
         fps = self.config.physics.fps
-        labelled.features[rows] = extract(self.character, seen.poses, seen.velocities, fps)
-        labelled.graze[rows] = seen.grazes
-        labelled.speed_change[rows] = seen.speed_changes
-        errors, exits, entries, chosen = choice_columns(self._oracle.answers(seen))
+        labels.features[rows] = extract(self.character, seen.poses, seen.velocities, fps)
+        labels.graze[rows] = seen.grazes
+        labels.speed_change[rows] = seen.speed_changes
+        errors, exits, entries, chosen = choice_columns(self._chooser.answers(seen))
         entries[:, -1] -= seen.contacts
-        labelled.errors[rows] = errors
-        labelled.exit_frames[rows] = exits
-        labelled.entry_frames[rows] = entries
-        labelled.label[rows] = chosen
+        labels.errors[rows] = errors
+        labels.exit_frames[rows] = exits
+        labels.entry_frames[rows] = entries
+        labels.label[rows] = chosen
 
     def _empty(self, count: int) -> HitLabels:
-        """As if every hit had missed."""
+        """Labels of hits that all missed."""
         classes = len(self.classes)
         return HitLabels(
             outcome=np.full(count, OUTCOMES.index("miss"), np.int8),

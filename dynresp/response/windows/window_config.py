@@ -1,26 +1,26 @@
-"""The constants of the window error and of the search for the best pair of windows."""
+"""Settings of the mismatch (window error), and of the search for the best pair of windows."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.checks import check_number
 from dynresp.support.errors import UsageError
 
 
 @dataclass(frozen=True)
 class WindowErrorConfig:
-    """Constants of the window error and of the search; all durations in seconds.
+    """Settings of the mismatch (window error) and of the search.
 
     Attributes:
         fps: Frame rate of the simulated trace and of every reaction clip [1/s].
-        window_s: Length of the windows that are compared.
-        exit_min_s: Earliest time after contact at which the simulation may be left.
-        exit_max_s: Latest such time; every frame from the earliest to the latest is tried.
-        entry_step_s: Distance of the frames at which a reaction may be entered.
+        window_s: Length of the windows that are compared [s].
+        exit_min_s: Earliest exit after contact [s].
+        exit_max_s: Latest exit [s]; every frame from the earliest to the latest is tried.
+        entry_step_s: Time between the entries that are tried [s].
         position_weight: Weight of a metre between two bodies; one number for all bodies or one
             for each.
         angle_weight: Weight of a radian between two bodies [m/rad]; one number or one for each
@@ -41,22 +41,22 @@ class WindowErrorConfig:
         Raises:
             UsageError: A value is out of range; the message names it.
         """
-        _check_number("fps", self.fps, above=0.0)
-        _check_number("window_s", self.window_s, above=0.0)
-        _check_number("exit_min_s", self.exit_min_s, at_least=0.0)
-        _check_number("exit_max_s", self.exit_max_s, at_least=self.exit_min_s)
-        _check_number("entry_step_s", self.entry_step_s, above=0.0)
+        check_number("fps", self.fps, 0.0, above_low=True)
+        check_number("window_s", self.window_s, 0.0, unit="s", above_low=True)
+        check_number("exit_min_s", self.exit_min_s, 0.0, unit="s")
+        check_number("exit_max_s", self.exit_max_s, self.exit_min_s, unit="s")
+        check_number("entry_step_s", self.entry_step_s, 0.0, unit="s", above_low=True)
         weights: list[float] = []
         for name in ("position_weight", "angle_weight"):
             value = getattr(self, name)
             values = value if isinstance(value, tuple) else (value,)
             for weight in values:
-                _check_number(name, weight, at_least=0.0)
+                check_number(name, weight, 0.0)
             weights.extend(values)
         if not any(weights):
             raise UsageError(
-                "position_weight and angle_weight are all zero: every window would match every "
-                "other. Give at least one body a weight above zero."
+                "position_weight and angle_weight are all zero, so all windows would be equal; "
+                "expected a weight above zero for at least one body"
             )
 
     @property
@@ -66,20 +66,20 @@ class WindowErrorConfig:
 
     @property
     def exit_frames(self) -> range:
-        """Frames of the trace, counted from contact, at which it may be left."""
+        """Exits: frames of the trace, counted from contact."""
         return range(round(self.exit_min_s * self.fps), round(self.exit_max_s * self.fps) + 1)
 
     @property
     def entry_step(self) -> int:
-        """Distance between tried entry frames, at least one."""
+        """Frames from one entry that is tried to the next, at least one."""
         return max(1, round(self.entry_step_s * self.fps))
 
     def frame_weights(self) -> FloatArray:
         """Weights w_i of the frames of a window, shape (window_frames,), summing to one.
 
         Quadratic, highest at the start and falling to nearly zero at the end, as in Zordan et al.
-        2005 (Dynamic response for motion capture animation): the frames at the transition itself
-        are to match best.
+        2005 (Dynamic response for motion capture animation): the first frames, at the transition,
+        should match best.
         """
         frames = self.window_frames
         weights: FloatArray = (1.0 - np.arange(frames) / frames) ** 2
@@ -96,20 +96,8 @@ class WindowErrorConfig:
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != bodies:
                 raise UsageError(
-                    f"{name} has {len(value)} values, the character has {bodies} bodies. Give one "
-                    "number for all bodies or one for each."
+                    f"{name} has {len(value)} values, the character has {bodies} bodies; expected "
+                    "one number for all bodies or one for each"
                 )
             rows.append(np.broadcast_to(np.asarray(value, dtype=np.float64), (bodies,)))
         return rows[0], rows[1]
-
-
-def _check_number(
-    name: str, value: float, *, above: float | None = None, at_least: float | None = None
-) -> None:
-    """Refuse a number that is not finite or not within its bound."""
-    if not math.isfinite(value):
-        raise UsageError(f"{name} is {value}; expected a finite number.")
-    if above is not None and not value > above:
-        raise UsageError(f"{name} is {value}; expected more than {above}.")
-    if at_least is not None and not value >= at_least:
-        raise UsageError(f"{name} is {value}; expected at least {at_least}.")

@@ -1,9 +1,9 @@
-"""Windows of motion, each in its own facing frame, laid out for the window search.
+"""Cut windows out of motions, each in its own facing frame, ready for the window search.
 
-The window error of Zordan et al. 2007 (section 5) compares a stretch of the simulation with a
-stretch of a reaction clip after "an alignment step removes the global differences and facing
-direction". Here that step is done once for every window instead of once for every pair: a window
-is moved so that its first frame stands at the origin and faces along +X. The error of two windows
+The mismatch (window error) of Zordan et al. 2007 (section 5) compares a short piece of the
+simulation with one of a reaction after "an alignment step removes the global differences and
+facing direction". Here that step is done once for each window, not once for each pair: a window is
+moved so that its first frame stands at the origin and faces along +X. The mismatch of two windows
 is then a plain sum over frames and bodies, see `window_kernel`.
 """
 
@@ -35,8 +35,9 @@ __all__ = [
     "trace_windows",
 ]
 
-# Windows are padded to whole vectors of this many, so that every pair of windows runs through the
-# same vector instructions and its error has the same bits wherever it stands in a clip.
+# The number of windows is padded to a multiple of this, the size of a vector. Every pair of windows
+# then runs through the same vector instructions, and its mismatch has the same bits wherever it is
+# in a clip.
 LANES = 8
 
 _UNIT_TOLERANCE = 1e-3
@@ -52,8 +53,8 @@ class ReactionTrack:
         name: Name of the reaction.
         positions: (frames, bodies, 3) [m], body 0 the pelvis, Z up.
         quaternions: (frames, bodies, 4), w x y z, unit length.
-        entry_range: Frames [first, last) of the clip at which it may be entered; None for all at
-            which a whole window is left.
+        entry_range: Entries that are allowed, frames [first, last) of the clip; None for all that
+            a whole window follows.
     """
 
     name: str
@@ -71,7 +72,7 @@ class WindowSet:
             position x y z [m] and quaternion w x y z in the facing frame of the window. Padding
             repeats the last window.
         starts: (windows,) first frame of each window within its track.
-        config: The configuration they were cut with.
+        config: The settings they were cut with.
     """
 
     data: npt.NDArray[np.float32]
@@ -84,20 +85,20 @@ class WindowSet:
         return int(self.data.shape[1])
 
     def __len__(self) -> int:
-        """Number of windows, padding left out."""
+        """Number of windows without padding."""
         return len(self.starts)
 
 
 @dataclass(frozen=True)
 class LibraryWindows:
-    """Windows of all reactions, one behind the other in one buffer; built once and kept.
+    """Windows of all reactions, one after the other in one buffer; built once and kept.
 
     Attributes:
         names: Names of the reactions.
         windows: Windows of each reaction; their `data` are views into `buffer`.
         buffer: All windows, flat float32.
         offsets: (reactions,) where the windows of each reaction begin in `buffer`.
-        config: The configuration they were cut with.
+        config: The settings they were cut with.
     """
 
     names: tuple[str, ...]
@@ -107,7 +108,7 @@ class LibraryWindows:
     config: WindowErrorConfig
 
     def index(self, name: str) -> int:
-        """Place of a reaction in the library.
+        """Index of a reaction in `names`.
 
         Raises:
             UnknownNameError: There is no reaction of that name.
@@ -135,11 +136,11 @@ class LibraryWindows:
 def facing_frames(
     pelvis_positions: npt.ArrayLike, pelvis_quaternions: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Where a character stands and which way it faces, from the pelvis alone.
+    """Ground point and facing of a character, from the pelvis alone.
 
-    The facing is the twist of the pelvis about the vertical (`rotations.yaw_of`), which stays
-    defined when the pelvis lies level, where the direction of its forward axis on the ground may
-    not be. A pelvis exactly upside down has no twist; its yaw is taken as zero.
+    The facing is the twist of the pelvis about the vertical (`rotations.yaw_of`). It is defined
+    also for somebody who lies, where the forward axis of the pelvis may point straight up or down.
+    A pelvis exactly upside down has no twist; its yaw is zero.
 
     Args:
         pelvis_positions: (..., 3) [m].
@@ -188,7 +189,7 @@ def make_many_windows(
     *,
     name: str = "track",
 ) -> list[WindowSet]:
-    """Cut the same windows out of several tracks, bit for bit as out of each alone.
+    """Cut the same windows out of several tracks, with the bits that each would have alone.
 
     Args:
         positions: (tracks, frames, bodies, 3) [m], body 0 the pelvis, Z up.
@@ -207,12 +208,12 @@ def make_many_windows(
     first = np.array(list(starts), dtype=np.int64)
     frames = config.window_frames
     if len(first) == 0:
-        raise MotionError(f"{name}: no window asked for; give at least one first frame.")
+        raise MotionError(f"{name}: no window was given; expected at least one first frame")
     if first.min() < 0 or first.max() + frames > position.shape[1]:
         raise MotionError(
             f"{name}: has {position.shape[1]} frames; windows of {frames} frames that begin at "
             f"frames {first.min()} to {first.max()} need {first.max() + frames}, and none may "
-            "begin before frame 0. Give a longer track or narrower bounds."
+            "begin before frame 0; give a longer track or narrower bounds"
         )
     ground, yaw = facing_frames(position[:, first, 0], quaternion[:, first, 0])
     turn = rotations.from_yaw(-yaw)[:, :, None, None]
@@ -233,7 +234,7 @@ def make_many_windows(
 def trace_windows(
     positions: npt.ArrayLike, quaternions: npt.ArrayLike, config: WindowErrorConfig
 ) -> WindowSet:
-    """Windows of a simulated trace, one for each frame at which it may be left.
+    """Windows of a simulated trace, one for each exit.
 
     Args:
         positions: (frames, bodies, 3) [m]; frame 0 is the first contact.
@@ -250,25 +251,25 @@ def trace_windows(
 
 
 def library_windows(tracks: Sequence[ReactionTrack], config: WindowErrorConfig) -> LibraryWindows:
-    """Windows of every reaction, one for each frame at which it may be entered.
+    """Windows of all reactions, one for each entry.
 
     Args:
         tracks: The reactions.
-        config: Gives the distance of the entries and the length of the windows.
+        config: Gives the step of the entries and the length of the windows.
 
     Returns:
         The windows of all reactions.
 
     Raises:
         MotionError: No reaction is given, a name is given twice, two reactions differ in their
-            bodies, or a reaction is refused by `make_windows` (too short, not finite, ...).
+            number of bodies, or `make_windows` refuses one (too short, not finite, ...).
     """
     if not tracks:
-        raise MotionError("the reaction library is empty; give at least one reaction.")
+        raise MotionError("the reaction library is empty; expected at least one reaction")
     names = tuple(track.name for track in tracks)
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise MotionError(f"reaction names must differ; given more than once: {', '.join(twice)}.")
+        raise MotionError(f"names of reactions given more than once: {', '.join(twice)}")
     made = []
     for track in tracks:
         label = f"reaction {track.name!r}"
@@ -277,7 +278,7 @@ def library_windows(tracks: Sequence[ReactionTrack], config: WindowErrorConfig) 
         if made[-1].bodies != made[0].bodies:
             raise MotionError(
                 f"{label} has {made[-1].bodies} bodies, reaction {names[0]!r} has "
-                f"{made[0].bodies}. All must be of one character."
+                f"{made[0].bodies}; all must be of one character"
             )
     ends = np.cumsum([windows.data.size for windows in made])
     buffer = _aligned(int(ends[-1]))
@@ -292,7 +293,7 @@ def library_windows(tracks: Sequence[ReactionTrack], config: WindowErrorConfig) 
 
 
 def _aligned(size: int) -> npt.NDArray[np.float32]:
-    """An array of float32 on a cache line boundary, which no vector of `LANES` then straddles."""
+    """An array of float32 that begins at a cache line, so that no vector crosses one."""
     line = 64
     raw = np.empty(size * 4 + line, dtype=np.uint8)
     start = -raw.ctypes.data % line
@@ -302,19 +303,19 @@ def _aligned(size: int) -> npt.NDArray[np.float32]:
 def _entries(
     frames: int, bounds: tuple[int, int] | None, config: WindowErrorConfig, label: str
 ) -> range:
-    """Entry frames of a clip of so many frames, within [first, last) where bounds are given."""
+    """Entries into a clip of so many frames, within [first, last) where bounds are given."""
     room = frames - config.window_frames + 1
     if room < 1:
         raise MotionError(
-            f"{label}: has {frames} frames, a window needs {config.window_frames}. "
-            "Take a longer range of the clip."
+            f"{label}: has {frames} frames, a window needs {config.window_frames}; "
+            "take a longer range of the clip"
         )
     first, last = bounds if bounds is not None else (0, room)
     if not 0 <= first < last <= room:
         raise MotionError(
-            f"{label}: entries from frame {first} to before frame {last} were asked for; with "
-            f"{frames} frames and windows of {config.window_frames} they must satisfy "
-            f"0 <= first < last <= {room}."
+            f"{label}: the entry range is frames {first} to {last} (not included); with "
+            f"{frames} frames and windows of {config.window_frames}, expected "
+            f"0 <= first < last <= {room}"
         )
     return range(first, last, config.entry_step)
 
@@ -330,14 +331,14 @@ def _checked_tracks(
         raise MotionError(
             f"{name}: positions have shape {position.shape[1:]}, quaternions "
             f"{quaternion.shape[1:]}; expected (frames, bodies, 3) and (frames, bodies, 4) with at "
-            "least one body."
+            "least one body"
         )
     finite = np.isfinite(position).all(axis=3) & np.isfinite(quaternion).all(axis=3)
     if not finite.all():
         _, frame, body = np.argwhere(~finite)[0]
         raise MotionError(
             f"{name}: {np.count_nonzero(~finite)} body states are not finite, the first at frame "
-            f"{frame}, body {body}. Leave such frames out before searching."
+            f"{frame}, body {body}; leave such frames out"
         )
     norms = np.linalg.norm(quaternion, axis=3)
     off = np.abs(norms - 1.0) > _UNIT_TOLERANCE
@@ -345,6 +346,6 @@ def _checked_tracks(
         track, frame, body = np.argwhere(off)[0]
         raise MotionError(
             f"{name}: the quaternion at frame {frame}, body {body} has length "
-            f"{norms[track, frame, body]:.4g}; expected unit length, w x y z."
+            f"{norms[track, frame, body]:.4g}; expected unit length, w x y z"
         )
     return position, quaternion / norms[..., None]

@@ -341,7 +341,7 @@ def test_libraries_that_make_no_sense_are_refused() -> None:
 
 def test_trace_and_library_must_belong_together() -> None:
     library = library_windows([ReactionTrack("a", *_track(1, 20))], CONFIG)
-    with pytest.raises(MotionError, match="one configuration"):
+    with pytest.raises(MotionError, match="the same settings"):
         search(trace_windows(*_track(1, 40), WindowErrorConfig(fps=30.0)), library)
     with pytest.raises(MotionError, match="3 bodies, the library 5"):
         search(trace_windows(*_track(1, TRACE_FRAMES, 3), CONFIG), library)
