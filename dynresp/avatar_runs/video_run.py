@@ -17,7 +17,7 @@ from dynresp.avatar_runs.visible_cluster_file import VideoModel
 from dynresp.avatar_runs.world_setup import TERRAIN, play_in_world
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.placement import wrapped
-from dynresp.locomotion.vision.segmentation import Picture, SegmentationConfig
+from dynresp.locomotion.vision.segmentation import EMPTY_ROOM_S, Picture
 from dynresp.locomotion.vision.video_control import VideoControl
 from dynresp.locomotion.vision.video_following import FollowStep, follow
 from dynresp.motion.character import Character
@@ -185,14 +185,14 @@ def _check_length(settings: VideoSettings, count: int, missing: str) -> None:
     Raises:
         MotionFileError: It is too short.
     """
-    empty = SegmentationConfig().empty_s
     seconds = count / settings.fps
-    if seconds < empty + _MIN_S:
+    if seconds < EMPTY_ROOM_S + _MIN_S:
         # Rounded down, so that a length that is too short never reads as long enough.
         found = "1 picture" if count == 1 else f"{math.floor(100 * seconds + 1e-6) / 100:.2f} s"
         raise MotionFileError(
-            f"{settings.name}: {found} of video; the first {empty:g} s show the empty room, "
-            f"so expected at least {empty + _MIN_S:g} s" + (f"; {missing}" if missing else "")
+            f"{settings.name}: {found} of video; the first {EMPTY_ROOM_S:g} s show the empty room, "
+            f"so expected at least {EMPTY_ROOM_S + _MIN_S:g} s"
+            + (f"; {missing}" if missing else "")
         )
 
 
@@ -223,12 +223,11 @@ class _Reel:
 
     def _until_the_end(self) -> Iterator[Picture]:
         settings = self._settings
-        empty_s = SegmentationConfig().empty_s
         room = "learning the empty room; nobody may be in the picture"
         last = _max_pictures(settings)
         length = last if settings.length is None else min(last, settings.length)
         while self.count < last:
-            if self.count > (empty_s + _MIN_S) * settings.fps and settings.stop():
+            if self.count > (EMPTY_ROOM_S + _MIN_S) * settings.fps and settings.stop():
                 return
             begun = time.perf_counter()
             self._last = next(self._pictures, None)
@@ -237,8 +236,8 @@ class _Reel:
                 return
             self.count += 1
             passed = self.count / settings.fps
-            if passed <= empty_s:
-                self._progress(room, self.count, round(empty_s * settings.fps))
+            if passed <= EMPTY_ROOM_S:
+                self._progress(room, self.count, round(EMPTY_ROOM_S * settings.fps))
             else:
                 self._progress(f"watching {settings.name}", self.count, length)
             yield self._last

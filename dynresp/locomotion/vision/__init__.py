@@ -1,1 +1,1 @@
-"""Control by video: silhouettes of a person before a camera against those of the database."""
+"""Control by video: compare the silhouette of a person before a camera with the database's."""

@@ -1,4 +1,4 @@
-"""A person before a camera, picture by picture: rows of features at the database's rate."""
+"""Find the person in each picture, and give features at the database's frame rate."""
 
 from __future__ import annotations
 
@@ -9,35 +9,32 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.vision.segmentation import Mask, Picture, SegmentationConfig, Segmenter
+from dynresp.locomotion.vision.segmentation import Mask, Picture, Segmenter
 from dynresp.locomotion.vision.silhouette_features import Measures, measure
 from dynresp.locomotion.vision.silhouette_table import ViewTable
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
 
-# The size of a person in the picture is the median of so long [s].
+# The size of a person in the picture is the median over this time [s].
 _SIZE_S = 1.0
-# Somebody who was not seen for so long has to be found anew [s].
+# Speeds begin again for a person who was not seen for this long [s].
 _LOST_S = 0.5
 
 
 class PersonTracker:
-    """Finds the person in pictures and tells what is seen in the numbers of a table.
+    """Finds the person in pictures, and gives rows of features as a table has them.
 
     Attributes:
-        mask: The silhouette found last; None where there is nobody, and while the room is learnt.
-        pictures: How many have come so far.
+        mask: The last silhouette; None if nobody was there, and while the room is learnt.
+        pictures: Number of pictures so far.
     """
 
-    def __init__(
-        self, table: ViewTable, fps: float, config: SegmentationConfig | None = None
-    ) -> None:
+    def __init__(self, table: ViewTable, fps: float) -> None:
         """Wait for the first picture.
 
         Args:
             table: What the database's frames look like.
             fps: Pictures per second of the video.
-            config: How the person is told from the room.
 
         Raises:
             UsageError: The frame rate is not above 0.
@@ -48,8 +45,8 @@ class PersonTracker:
         self.pictures = 0
         self._table = table
         self._fps = fps
-        self._segmenter = Segmenter(min(fps, table.fps), config)
-        # What was measured, one entry a frame of the database.
+        self._segmenter = Segmenter(min(fps, table.fps))
+        # What was measured, one entry for each frame of the database.
         kept = max(table.span, round(_SIZE_S * table.fps)) + 1
         self._seen: deque[Measures] = deque(maxlen=kept)
         self._ticks = 0
@@ -58,15 +55,15 @@ class PersonTracker:
     def see(self, picture: Picture) -> list[npt.NDArray[np.float32]]:
         """Look at the next picture.
 
-        Of a video faster than the database only as many pictures are looked at as there are
-        frames; of a slower one a picture stands for several frames.
+        If the video has more pictures a second than the database has frames, some pictures are
+        passed over. If it has fewer, one picture stands for several frames.
 
         Returns:
-            Rows (d,) as in the table, one a frame of the database; none where the picture is
+            Rows (d,) as in the table, one for each frame of the database; none if the picture is
             passed over, the room is still being learnt, or nobody is there.
 
         Raises:
-            MotionError: It is no picture, or of another size than those before.
+            MotionError: It is not a picture, or its size differs from the first one's.
         """
         self.pictures += 1
         due = int(self.pictures * self._table.fps / self._fps + 1e-9) - self._ticks
@@ -80,7 +77,7 @@ class PersonTracker:
             if self._missed > _LOST_S * self._table.fps:
                 self._seen.clear()
             return []
-        # Where somebody was hidden for a moment, the speeds need an entry for every frame.
+        # After a person was hidden for a moment, speeds still need an entry for every frame.
         self._seen.extend([measured] * (self._missed if self._seen else 0))
         self._missed = 0
         rows = []
@@ -90,7 +87,7 @@ class PersonTracker:
         return rows
 
     def _now(self) -> FloatArray:
-        """What is measured now: the shape, the centre's speeds and growth."""
+        """(m,) what is measured now: the shape, the centre's speeds [radii/s], growth [1/s]."""
         now = self._seen[-1]
         before = self._seen[-1 - min(self._table.span, len(self._seen) - 1)]
         passed = max(min(self._table.span, len(self._seen) - 1), 1) / self._table.fps
@@ -105,12 +102,12 @@ class PersonTracker:
 
 @dataclass(frozen=True, eq=False)
 class PictureFeatures:
-    """What one picture tells.
+    """The features of one picture.
 
     Attributes:
-        time_s: When its time ends, from the first picture on [s].
+        time_s: When the picture's time ends; the first picture begins at 0 [s].
         rows: See `PersonTracker.see`.
-        mask: The person's silhouette; None where nobody is seen.
+        mask: The person's silhouette; None if nobody is seen.
     """
 
     time_s: float
@@ -119,24 +116,20 @@ class PictureFeatures:
 
 
 def track_person(
-    pictures: Iterable[Picture],
-    fps: float,
-    table: ViewTable,
-    segmentation: SegmentationConfig | None = None,
+    pictures: Iterable[Picture], fps: float, table: ViewTable
 ) -> Iterator[PictureFeatures]:
-    """Look at pictures as they come, one sighting for each.
+    """Give the features of each picture as it comes.
 
     Args:
-        pictures: See `Segmenter`; the first second shows the room alone.
-        fps: How many there are a second.
+        pictures: See `Segmenter.segment`; the first second shows the empty room.
+        fps: Pictures per second.
         table: What the database's frames look like.
-        segmentation: How the person is told from the room.
 
     Raises:
         UsageError: The frame rate is not above 0.
-        MotionError: A picture is none, or of another size than those before.
+        MotionError: One of them is not a picture, or its size differs from the first one's.
     """
-    tracker = PersonTracker(table, fps, segmentation)
+    tracker = PersonTracker(table, fps)
     for count, picture in enumerate(pictures, start=1):
         rows = tracker.see(picture)
         yield PictureFeatures(count / fps, rows, tracker.mask)

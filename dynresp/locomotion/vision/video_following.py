@@ -1,4 +1,4 @@
-"""An avatar that follows somebody before a camera, in the video's time."""
+"""An avatar that follows a person before a camera, in the video's time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dynresp.locomotion.graph.random_walk import check_in_component, random_walk
 from dynresp.locomotion.vision.person_tracker import PictureFeatures, track_person
-from dynresp.locomotion.vision.segmentation import Mask, Picture, SegmentationConfig
+from dynresp.locomotion.vision.segmentation import Mask, Picture
 from dynresp.locomotion.vision.video_control import VideoControl
 from dynresp.support.arrays import IntArray
 
@@ -19,14 +19,14 @@ CHOICE_S = 0.1
 
 @dataclass(frozen=True, eq=False)
 class FollowStep:
-    """What the avatar does between a choice and the next.
+    """What the avatar does from one choice to the next.
 
     Attributes:
-        time_s: When, from the first picture on [s].
+        time_s: Time of the choice; the first picture begins at 0 [s].
         frames: (k,) frames of the graph that it plays after those before.
-        cluster: The cluster to which the chosen way leads; None where nobody was seen so far.
-        person_cluster: The cluster in which the person is most probably; None likewise.
-        mask: The person's silhouette; None where nobody is seen.
+        cluster: The cluster to which the chosen path leads; None if nobody was seen so far.
+        person_cluster: The person's most probable cluster; None if nobody was seen so far.
+        mask: The person's silhouette; None if nobody is seen.
     """
 
     time_s: float
@@ -42,46 +42,44 @@ def follow(
     control: VideoControl,
     frame: int,
     rng: np.random.Generator,
-    segmentation: SegmentationConfig | None = None,
 ) -> Iterator[FollowStep]:
     """Choose for the avatar ten times a second.
 
-    Until somebody is seen it goes by the graph's probabilities. Nothing is read ahead: what is
-    yielded follows from the pictures up to then, so that they may come from a camera.
+    Until a person is seen, the avatar does a random walk. No picture is read ahead of time, so
+    that pictures may come from a camera.
 
     Args:
-        pictures: See `Segmenter`; the first second shows the room alone.
-        fps: How many there are a second.
+        pictures: See `Segmenter.segment`; the first second shows the empty room.
+        fps: Pictures per second.
         control: Chooses; it has seen nothing yet.
         frame: The frame of the graph at which the avatar begins.
-        rng: For as long as it goes by chance.
-        segmentation: How the person is told from the room.
+        rng: For the random walk.
 
     Raises:
         UsageError: The frame is not in the graph's component, or the frame rate not above 0.
-        MotionError: A picture is none, or of another size than those before.
+        MotionError: One of them is not a picture, or its size differs from the first one's.
     """
     check_in_component(control.forest.graph, frame)
-    seen = track_person(pictures, fps, control.table, segmentation)
+    seen = track_person(pictures, fps, control.table)
     yield from follow_features(seen, control, frame, rng)
 
 
 def follow_features(
     seen: Iterable[PictureFeatures], control: VideoControl, frame: int, rng: np.random.Generator
 ) -> Iterator[FollowStep]:
-    """The same from what the pictures told: see `follow` and `track_person`.
+    """`follow`, from the features of pictures that `track_person` gives.
 
     Raises:
         UsageError: The frame is not in the graph's component.
     """
     graph = control.forest.graph
     check_in_component(graph, frame)
-    somebody = False
+    person_seen = False
     played = chosen = 0
     for features in seen:
         for row in features.rows:
             control.see(row)
-            somebody = True
+            person_seen = True
         time_s = features.time_s
         if int(time_s / CHOICE_S + 1e-9) == chosen:
             continue
@@ -89,14 +87,14 @@ def follow_features(
         due = int(time_s * control.table.fps + 1e-9) - played
         played += due
         frames, cluster = np.empty(0, dtype=np.int32), None
-        # A way that ends early is followed by another.
-        while somebody and len(frames) < due:
-            way = control.choose(frame)
-            cluster = way.cluster if cluster is None else cluster
-            frames = np.concatenate([frames, way.frames[: due - len(frames)]])
+        # A path that ends early is followed by another.
+        while person_seen and len(frames) < due:
+            path = control.choose(frame)
+            cluster = path.cluster if cluster is None else cluster
+            frames = np.concatenate([frames, path.frames[: due - len(frames)]])
             frame = int(frames[-1])
         if len(frames) < due:
             frames = random_walk(graph, due, rng, frame)
             frame = int(frames[-1])
-        person_cluster = int(np.argmax(control.clusters)) if somebody else None
+        person_cluster = int(np.argmax(control.clusters)) if person_seen else None
         yield FollowStep(time_s, frames.astype(np.int32), cluster, person_cluster, features.mask)

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from dynresp.locomotion.vision.segmentation import SegmentationConfig, Segmenter
+from dynresp.locomotion.vision import segmentation
+from dynresp.locomotion.vision.segmentation import Segmenter
 from dynresp.motion.motion import Motion
 from dynresp.support.errors import MotionError
 from studies.video.filming import Filming, film
@@ -14,7 +15,7 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(("seed", "who"), [(1, "02"), (2, "127"), (3, "17")])
-def test_somebody_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> None:
+def test_a_person_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> None:
     somebody = person(who, tmp_path)
     act = stepping if seed == 1 else waving
     motion = Motion(act(somebody, 120, 30.0), 30.0)
@@ -27,7 +28,7 @@ def test_somebody_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> N
     assert np.min(overlaps) > 0.6
 
 
-def test_somebody_who_stands_still_does_not_fade(tmp_path) -> None:
+def test_a_person_who_stands_still_does_not_fade(tmp_path) -> None:
     somebody = person("16", tmp_path)
     motion = Motion(np.tile(somebody.rest_pose, (300, 1)), 10.0)
     masks: list[np.ndarray] = []
@@ -39,15 +40,16 @@ def test_somebody_who_stands_still_does_not_fade(tmp_path) -> None:
 
 def test_an_empty_room_is_empty_even_when_it_gets_dark(rng) -> None:
     room = rng.uniform(60, 200, (90, 120, 3))
-    segmenter = Segmenter(10.0, SegmentationConfig(empty_s=1.0))
+    segmenter = Segmenter(10.0)
     for k in range(60):
         light = 1.0 if k < 10 else 1.0 - 0.4 * (k - 10) / 50
         picture = room * light + rng.normal(0.0, 3.0, room.shape)
         assert segmenter.segment(np.clip(picture, 0, 255).astype(np.uint8)) is None
 
 
-def test_large_pictures_are_shrunk_and_their_size_must_stay() -> None:
-    segmenter = Segmenter(2.0, SegmentationConfig(largest=64))
+def test_large_pictures_are_shrunk_and_their_size_must_stay(monkeypatch) -> None:
+    monkeypatch.setattr(segmentation, "LONGEST_SIDE", 64)
+    segmenter = Segmenter(2.0)
     grey = np.full((300, 200, 3), 90, dtype=np.uint8)
     segmenter.segment(grey)
     segmenter.segment(grey)
@@ -61,6 +63,6 @@ def test_large_pictures_are_shrunk_and_their_size_must_stay() -> None:
 @pytest.mark.parametrize(
     "wrong", [np.zeros((9, 9)), np.zeros((9, 9, 3)), np.zeros((0, 9, 3), dtype=np.uint8), "room"]
 )
-def test_what_is_no_picture_is_refused(wrong) -> None:
+def test_what_is_not_a_picture_is_refused(wrong) -> None:
     with pytest.raises(MotionError, match="picture must be"):
         Segmenter(30.0).segment(wrong)

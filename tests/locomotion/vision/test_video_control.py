@@ -5,7 +5,6 @@ import pytest
 
 from dynresp.locomotion.vision.action_recognition import Recogniser
 from dynresp.locomotion.vision.video_control import (
-    ControlConfig,
     VideoControl,
     open_paths,
     warped_costs,
@@ -16,21 +15,21 @@ from tests.locomotion.vision.samples import STEPPING, WAVING
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_open_ways_go_along_the_graph(seed: int) -> None:
+def test_open_paths_go_along_the_graph(seed: int) -> None:
     forest = random_forest(np.random.default_rng(seed), (20, 14), jumps=9)
     graph = forest.graph
     edges = set(zip(graph.sources.tolist(), graph.targets.tolist(), strict=True))
     for frame in graph.frames[::5].tolist():
-        ways = open_paths(forest, frame, 1.0)
-        assert ways
-        for way in ways:
-            along = [frame, *way.frames.tolist()]
+        paths = open_paths(forest, frame, 1.0)
+        assert paths
+        for path in paths:
+            along = [frame, *path.frames.tolist()]
             assert 2 <= len(along) <= 16
             assert set(itertools.pairwise(along)) <= edges
-            assert way.cluster in forest.clusters.labels[way.frames]
+            assert path.cluster in forest.clusters.labels[path.frames]
 
 
-def test_the_recogniser_tells_what_it_has_learnt(forest, table, recogniser) -> None:
+def test_the_recogniser_knows_what_it_has_learnt(forest, table, recogniser) -> None:
     assert recogniser.probabilities(table.rows[20:40, 3]).argmax() == STEPPING
     assert recogniser.probabilities(table.rows[120:140, 3]).argmax() == WAVING
     # A single row is enough, and probabilities add up.
@@ -39,19 +38,19 @@ def test_the_recogniser_tells_what_it_has_learnt(forest, table, recogniser) -> N
     np.testing.assert_array_equal(again.weights[0], recogniser.weights[0])
 
 
-def test_clusters_without_frames_are_never_told(forest, table) -> None:
+def test_clusters_without_frames_are_never_recognised(forest, table) -> None:
     labels = np.where(forest.clusters.labels == WAVING, 3, 1).astype(np.int32)
-    told = Recogniser.trained(forest.graph.database, table, labels)
-    shares = told.probabilities(table.rows[120:140, 3])
+    recogniser = Recogniser.trained(forest.graph.database, table, labels)
+    shares = recogniser.probabilities(table.rows[120:140, 3])
     assert shares.argmax() == 3
     assert shares[0] == shares[2] == 0.0
 
 
-def test_the_way_that_was_seen_costs_nothing(forest, table) -> None:
-    ways = open_paths(forest, 20, 2.0)
-    seen = table.rows[ways[0].frames[:12], 6]
-    costs = warped_costs(seen, table, forest, 20, ways)
-    assert costs.shape == (len(ways), 18)
+def test_the_path_that_was_seen_costs_nothing(forest, table) -> None:
+    paths = open_paths(forest, 20, 2.0)
+    seen = table.rows[paths[0].frames[:12], 6]
+    costs = warped_costs(seen, table, forest, 20, paths)
+    assert costs.shape == (len(paths), 18)
     assert costs[0, 6] == pytest.approx(0.0, abs=1e-5)
     assert costs.min() >= 0.0
 
@@ -75,7 +74,3 @@ def test_wrong_requests_are_refused(forest, table, recogniser, rng) -> None:
     other = random_forest(rng, clusters=3)
     with pytest.raises(UsageError, match="clusters"):
         VideoControl(other, table, recogniser)
-    with pytest.raises(UsageError, match="patience_s"):
-        ControlConfig(patience_s=0.0)
-    with pytest.raises(UsageError, match="compared"):
-        ControlConfig(compared=0)
