@@ -28,8 +28,8 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
 from dynresp.support.errors import UsageError
 
-LOOK_AHEAD_S = 3.0
-"""How far the paths open to the avatar are looked at [s]."""
+# How far the paths open to the avatar are looked at [s].
+_LOOK_AHEAD_S = 3.0
 # What a path does later counts less: its weight falls to 1/e in this time [s].
 _PATIENCE_S = 1.0
 # What was recognised before counts less: its weight falls to 1/e in this time [s].
@@ -148,7 +148,7 @@ class VideoControl:
         """
         if not self._rows:
             raise UsageError("nobody has been seen yet; call `see` with a row before `choose`")
-        paths = open_paths(self.forest, frame, LOOK_AHEAD_S)
+        paths = open_paths(self.forest, frame, _LOOK_AHEAD_S)
         labels = self.forest.clusters.labels
         steps = max(len(path.frames) for path in paths)
         fading = np.exp(-np.arange(steps) / (_PATIENCE_S * self.table.fps))
