@@ -17,7 +17,8 @@ from dynresp.motion.character import POSE_SIZE, VELOCITY_SIZE, default_character
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.controls import Controls
-from dynresp.physics.impacts import Ball, prepare
+from dynresp.physics.impacts import Ball
+from dynresp.physics.prepared_impact import prepare
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig, Scene
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup

@@ -11,7 +11,8 @@ import numpy as np
 from dynresp.datasets.dataset_spec import DatasetSpec, ImpactTable
 from dynresp.physics.drawn_hits import draw_hits
 from dynresp.physics.impact_spec import PushTable
-from dynresp.physics.impacts import Impact, flight_s
+from dynresp.physics.impacts import Impact
+from dynresp.physics.prepared_impact import flight_s
 from dynresp.specs.values import Choice, Number, Uniform, draw
 from dynresp.support.errors import SpecError
 
@@ -74,7 +75,7 @@ def _pick(weights: Sequence[float], rng: np.random.Generator) -> int:
 
 
 def lead_s(radius: float, speed: float | None) -> float:
-    """How long before an impact its simulation begins [s], as `physics.impacts.prepare` has it.
+    """How long before an impact its simulation begins [s], as `prepared_impact.prepare` has it.
 
     Args:
         radius: Of a ball or a fist [m].

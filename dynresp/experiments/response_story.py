@@ -10,7 +10,8 @@ from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT
 from dynresp.motion.motion import Motion, move_poses
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import GRAVITY, Impact, PreparedImpact, Strike
+from dynresp.physics.impacts import Impact, Strike
+from dynresp.physics.prepared_impact import GRAVITY, PreparedImpact
 from dynresp.response.response import CARRY_ON, Response
 from dynresp.view.story import MovingSphere, Story, StoryEvent, StoryPhase
 

@@ -19,7 +19,8 @@ from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.sources.motion_folders import motion_folders
 from dynresp.physics.drawn_hits import Hit, draw_hits
 from dynresp.physics.impact_spec import StrikerCut, StrikeTable
-from dynresp.physics.impacts import Ball, prepare
+from dynresp.physics.impacts import Ball
+from dynresp.physics.prepared_impact import prepare
 from dynresp.response.chooser import NamedChooser, make_chooser
 from dynresp.response.responder import Responder
 from dynresp.response.response import Response, ResponseConfig

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from dynresp.motion import rotations
 from dynresp.motion.character import JOINTS, ROOT, ROOT_QUAT
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import PreparedImpact, push_profile
+from dynresp.physics.prepared_impact import PreparedImpact, push_profile
 from dynresp.physics.scene import HOLD_LEAD_S, STRIKE_LEAD_S, Scene
 from dynresp.physics.servo import servo_gains
 

@@ -19,7 +19,7 @@ from dynresp.motion.character import POSE_SIZE, VELOCITY_SIZE
 from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import FloatArray
 from dynresp.physics.controls import Controls
-from dynresp.physics.impacts import WAIT_S, sphere_inertia
+from dynresp.physics.prepared_impact import WAIT_S, sphere_inertia
 from dynresp.physics.scene import ImpactorKind, Scene
 from dynresp.physics.trace import Contact, Divergence, Setup, Trace
 

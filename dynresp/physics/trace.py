@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import PreparedImpact
+from dynresp.physics.prepared_impact import PreparedImpact
 
 
 @dataclass(frozen=True)

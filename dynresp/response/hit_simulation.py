@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import Impact, PreparedImpact, prepare
+from dynresp.physics.impacts import Impact
+from dynresp.physics.prepared_impact import PreparedImpact, prepare
 from dynresp.physics.scene import ImpactorKind, Scene
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup

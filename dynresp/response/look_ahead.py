@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynresp.motion.character import BodyStates, Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import PreparedImpact
+from dynresp.physics.prepared_impact import PreparedImpact
 from dynresp.physics.trace import Trace
 from dynresp.response.response import GRAZE_S, ResponseConfig
 

@@ -12,7 +12,8 @@ from dynresp.motion.ground import foot_contacts
 from dynresp.motion.motion import Motion
 from dynresp.motion.reactions.reaction_library import ReactionLibrary
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import Impact, PreparedImpact
+from dynresp.physics.impacts import Impact
+from dynresp.physics.prepared_impact import PreparedImpact
 from dynresp.physics.trace import Trace
 from dynresp.response.choice import Choice, Chooser
 from dynresp.response.hit_simulation import HitBatch, HitStage

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from dynresp.motion.character import BodyStates
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import PreparedImpact
+from dynresp.physics.prepared_impact import PreparedImpact
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Contact, Divergence
 from dynresp.response.prediction.hit_features import SLICES_S

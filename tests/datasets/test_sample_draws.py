@@ -8,7 +8,8 @@ from dynresp.datasets.dataset_spec_reader import parse_dataset_spec
 from dynresp.datasets.sample_draws import TAIL_S, check_durations, draw_sample
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
-from dynresp.physics.impacts import Ball, Push, prepare
+from dynresp.physics.impacts import Ball, Push
+from dynresp.physics.prepared_impact import prepare
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.support.errors import SpecError
 

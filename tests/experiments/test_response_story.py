@@ -4,7 +4,8 @@ import pytest
 from dynresp.experiments.response_story import response_story
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
-from dynresp.physics.impacts import Ball, Impact, Punch, Strike, prepare
+from dynresp.physics.impacts import Ball, Impact, Punch, Strike
+from dynresp.physics.prepared_impact import prepare
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.response.response import Response
 

@@ -19,7 +19,7 @@ from dynresp.motion import rotations
 from dynresp.motion.character import JOINTS, POSE_SIZE, ROOT, ROOT_QUAT, VELOCITY_SIZE, Character
 from dynresp.motion.motion import pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import WAIT_S, PreparedImpact
+from dynresp.physics.prepared_impact import WAIT_S, PreparedImpact
 from dynresp.physics.scene import (
     HOLD_LEAD_S,
     IMPACTOR_PREFIX,

@@ -10,7 +10,8 @@ from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import Ball, Impact, prepare
+from dynresp.physics.impacts import Ball, Impact
+from dynresp.physics.prepared_impact import prepare
 from dynresp.physics.scene import PhysicsConfig, Scene
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup

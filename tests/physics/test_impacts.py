@@ -10,17 +10,8 @@ from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import (
-    Ball,
-    Impact,
-    PreparedImpact,
-    Punch,
-    Push,
-    Strike,
-    prepare,
-    push_profile,
-    sphere_inertia,
-)
+from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
+from dynresp.physics.prepared_impact import PreparedImpact, prepare, push_profile, sphere_inertia
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup, Trace

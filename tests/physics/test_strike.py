@@ -9,7 +9,8 @@ from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import PreparedImpact, Strike, prepare
+from dynresp.physics.impacts import Strike
+from dynresp.physics.prepared_impact import PreparedImpact, prepare
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig, Scene
 from dynresp.physics.simulation import Simulation
 from dynresp.physics.trace import Setup

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dynresp.motion import rotations
 from dynresp.motion.character import ROOT_QUAT, Character
 from dynresp.motion.motion import FEET, Motion
-from dynresp.physics.impacts import PreparedImpact
+from dynresp.physics.prepared_impact import PreparedImpact
 from dynresp.physics.scene import ImpactorKind
 from dynresp.physics.trace import Contact
 from dynresp.response.response import Response

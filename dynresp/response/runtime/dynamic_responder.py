@@ -14,7 +14,8 @@ import numpy as np
 from dynresp.motion.character import Character
 from dynresp.motion.motion import Motion, pose_velocities
 from dynresp.motion.rotations import FloatArray
-from dynresp.physics.impacts import WAIT_S, Impact, PreparedImpact, Push, prepare
+from dynresp.physics.impacts import Impact, Push
+from dynresp.physics.prepared_impact import WAIT_S, PreparedImpact, prepare
 from dynresp.physics.scene import PhysicsConfig
 from dynresp.physics.trace import Setup, Trace
 from dynresp.response.choice import Choice
@@ -26,7 +27,7 @@ from dynresp.support.errors import MotionError, SpecError
 # as `Responder` rounds them. A later one is prepared from `_LEAD_S` before it is due, because a
 # character may play for hours.
 _FROM_START_S = 10.0
-# More than any impact needs to arrive [s] (`dynresp.physics.impacts.flight_s`).
+# More than any impact needs to arrive [s] (`dynresp.physics.prepared_impact.flight_s`).
 _LEAD_S = 1.0
 # A hit can be due at most this long from now [s].
 _LATEST_S = 60.0
