@@ -1,10 +1,9 @@
-"""The compiled collision test: does the footprint of a body overlap a box.
+"""The compiled collision test: whether the footprint of a body overlaps a box.
 
-Importing this module compiles it (about a second) or loads it from numba's cache; import it where
-it is used.
+Importing this module imports numba; import it where it is used.
 
-A grid over the world says for each cell how far the nearest box is from its middle, and which
-boxes a body that stands in the cell might touch. Far from all boxes one look at the grid is enough.
+A grid over the world has for each cell the distance from its middle to the nearest box, and a list
+of the boxes that a body in the cell might touch. Far from all boxes the distance alone decides.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ GRID = (REALS, CLEARANCE, LISTS, LISTS, ROWS)
 
 
 @helper(inline="always")
-def _apart(x, y, cosine, sine, half_x, half_y, box):
+def _is_separate(x, y, cosine, sine, half_x, half_y, box):
     """Whether a line along a side separates two rectangles (the separating axis theorem)."""
     away_x, away_y = box[0] - x, box[1] - y
-    # Cosine and sine of the turn from one to the other.
+    # Cosine and sine of the angle between them.
     c = abs(cosine * box[4] + sine * box[5])
     s = abs(cosine * box[5] - sine * box[4])
     return (
@@ -75,13 +74,13 @@ def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, me
     middle_y = y + sine * ahead + cosine * aside
     cell = column * clearance.shape[1] + row
     for member in range(starts[cell], starts[cell + 1]):
-        if not _apart(middle_x, middle_y, cosine, sine, half_x, half_y, boxes[members[member]]):
+        if not _is_separate(middle_x, middle_y, cosine, sine, half_x, half_y, boxes[members[member]]):
             return True
     return False
 
 
 @helper(inline="always")
-def _away(x, y, box):
+def _distance(x, y, box):
     """Distance of a point to a box [m], negative inside."""
     x, y = x - box[0], y - box[1]
     beyond_x = abs(box[4] * x + box[5] * y) - box[2]
@@ -94,13 +93,13 @@ def _away(x, y, box):
     types.void(ROWS, WINDOWS, REALS, types.float64, types.float32[:, ::1], types.int64[::1])
 )  # fmt: skip
 def count_kernel(boxes, windows, frame, near, clearance, counts):
-    """Count the boxes near to each cell of a grid, and find how near they come.
+    """Count the boxes near each cell of a grid, and find the distance of the nearest one.
 
     Args:
         boxes: (n, 6) rows of `World.boxes`.
         windows: (n, 4) first and last column, first and last row of cells that may be near.
         frame: (3,) x and y of the grid's corner, side of its cells [m].
-        near: Distance from the middle of a cell up to which a box is near to it [m].
+        near: Largest distance from the middle of a cell at which a box is near it [m].
         clearance: In and out, (columns, rows) the least distance [m].
         counts: Out, (columns * rows,), zeros before.
     """
@@ -108,7 +107,7 @@ def count_kernel(boxes, windows, frame, near, clearance, counts):
         for column in range(windows[box, 0], windows[box, 1] + 1):
             x = frame[0] + frame[2] * (column + 0.5)
             for row in range(windows[box, 2], windows[box, 3] + 1):
-                away = _away(x, frame[1] + frame[2] * (row + 0.5), boxes[box])
+                away = _distance(x, frame[1] + frame[2] * (row + 0.5), boxes[box])
                 if away <= near:
                     counts[column * clearance.shape[1] + row] += 1
                     clearance[column, row] = min(clearance[column, row], np.float32(away))
@@ -118,7 +117,7 @@ def count_kernel(boxes, windows, frame, near, clearance, counts):
     types.void(ROWS, WINDOWS, REALS, types.float64, types.int64, types.int64[::1], types.int32[::1])
 )  # fmt: skip
 def list_kernel(boxes, windows, frame, near, rows, free, members):
-    """List the boxes near to each cell of a grid, ascending.
+    """List the boxes near each cell of a grid, in ascending order.
 
     Args:
         boxes: See `count_kernel`.
@@ -126,26 +125,26 @@ def list_kernel(boxes, windows, frame, near, rows, free, members):
         frame: The same.
         near: The same.
         rows: Of cells.
-        free: (columns * rows,) where the list of each cell begins; where it ends, out.
+        free: (columns * rows,) in: where the list of each cell begins; out: where it ends.
         members: Out, (k,) the lists.
     """
     for box in range(len(boxes)):
         for column in range(windows[box, 0], windows[box, 1] + 1):
             x = frame[0] + frame[2] * (column + 0.5)
             for row in range(windows[box, 2], windows[box, 3] + 1):
-                if _away(x, frame[1] + frame[2] * (row + 0.5), boxes[box]) <= near:
+                if _distance(x, frame[1] + frame[2] * (row + 0.5), boxes[box]) <= near:
                     cell = column * rows + row
                     members[free[cell]] = box
                     free[cell] += 1
 
 
 @compiled(types.void(ROWS, types.float64, *GRID, types.float64[::1]))
-def distances_kernel(points, farthest, frame, clearance, starts, members, boxes, out):
-    """How far points are from the nearest box.
+def distances_kernel(points, max_distance, frame, clearance, starts, members, boxes, out):
+    """Measure the distance of points to the nearest box.
 
     Args:
         points: (n, 2) [m].
-        farthest: Distances beyond this are not told apart [m].
+        max_distance: Larger distances become this [m].
         frame: Of the grid.
         clearance: Of its cells.
         starts: Of its lists.
@@ -157,14 +156,14 @@ def distances_kernel(points, farthest, frame, clearance, starts, members, boxes,
         x, y = points[i, 0], points[i, 1]
         column = math.floor((x - frame[0]) / frame[2])
         row = math.floor((y - frame[1]) / frame[2])
-        nearest = farthest
+        nearest = max_distance
         if column < 0 or row < 0 or column >= clearance.shape[0] or row >= clearance.shape[1]:
             for box in range(len(boxes)):
-                nearest = min(nearest, _away(x, y, boxes[box]))
+                nearest = min(nearest, _distance(x, y, boxes[box]))
         else:
             cell = column * clearance.shape[1] + row
             for member in range(starts[cell], starts[cell + 1]):
-                nearest = min(nearest, _away(x, y, boxes[members[member]]))
+                nearest = min(nearest, _distance(x, y, boxes[members[member]]))
         out[i] = nearest
 
 

@@ -1,7 +1,6 @@
 """The compiled footprint: how far a body reaches over the ground around its root.
 
-Importing this module compiles it (about a second) or loads it from numba's cache; import it where
-it is used.
+Importing this module imports numba; import it where it is used.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ def footprint(pose, positions, quaternions, body, out):
         out: Out, (4,) least x, largest x, least y, largest y in the root's facing frame [m].
     """
     _, _, owners, kinds, sizes, centers, turns = body
-    # The facing of `rotations.yaw_of`: half of its angle has this cosine and this sine.
+    # The yaw of `rotations.yaw_of`, by the cosine and sine of its half.
     w, z = (pose[3], pose[6]) if pose[3] >= 0.0 else (-pose[3], -pose[6])
     length = math.sqrt(w * w + z * z)
     half_c, half_s = (w / length, z / length) if length > 0.0 else (1.0, 0.0)

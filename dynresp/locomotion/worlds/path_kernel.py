@@ -1,11 +1,11 @@
-"""Where on a path an avatar is, and eq. 8 along it, compiled into the searches that use them.
+"""Progress of an avatar along a path, and eq. 8 along it, compiled into the searches.
 
 Importing this module imports numba; import it where it is used.
 
-The paper takes a path as goal positions to be traversed one after the other (Lee et al. 2002,
-section 5.2). So how much of it is done never becomes less: what lies behind is done, though the
-path may come by there again. A path that turns back on itself is nearest twice at every place;
-looked at from the first of the two on, and a little ahead, there and back are told apart.
+In the paper a path is a row of goals that the avatar reaches one after the other (Lee et al. 2002,
+section 5.2). So progress never decreases, though the path may return to a point. Where a path goes
+back along itself, two of its points are nearest. The search for the nearest point starts at the
+progress so far and ends a little ahead, which separates the two.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ import math
 
 from dynresp.support.compiling import helper
 
-# Squared distances [m^2] that differ by less are alike: there and back on one line.
-_ALIKE = 1e-9
+# Squared distances [m^2] that differ by less are equal: a path that goes back along one line.
+_EQUAL = 1e-9
 
 
 @helper
 def nearest_on(path, x, y, progress, window):
-    """The nearest point of a path, from what is done of it on; of equal ones the first.
+    """Find the nearest point of a path from the progress on; of equal ones the first.
 
     Args:
-        path: (p, 2) points about equally far apart, or one alone [m].
-        x: Where the avatar is [m].
+        path: (p, 2) points at about equal distances, or a single one [m].
+        x: Position of the avatar [m].
         y: The same.
-        progress: How much of the path is done [points].
-        window: How far beyond that the nearest point is looked for [points].
+        progress: Progress along the path so far [points].
+        window: How far beyond that to search [points].
 
     Returns:
-        How much is done then [points], at least `progress`, and the distance to there [m].
+        The new progress [points], at least `progress`, and the distance to that point [m].
     """
     last = len(path) - 1
     if last == 0:
@@ -45,27 +45,27 @@ def nearest_on(path, x, y, progress, window):
         share = min(max(share, progress - k, 0.0), 1.0)
         off_x, off_y = away_x - share * along_x, away_y - share * along_y
         square = off_x * off_x + off_y * off_y
-        if square < least - _ALIKE:
+        if square < least - _EQUAL:
             least, nearest = square, k + share
     return nearest, math.sqrt(least)
 
 
 @helper
 def eq_8(path, x, y, cosine, sine, progress, target, away, ahead, facing, spacing):
-    """Eq. 8 with the way left along the path in place of the straight distance [m].
+    """Eq. 8 with the remaining length of the path in place of the straight distance [m].
 
     Args:
-        path: (p, 2) points `spacing` apart, or one alone [m].
-        x: Where the avatar is [m].
+        path: (p, 2) points `spacing` apart, or a single one [m].
+        x: Position of the avatar [m].
         y: The same.
-        cosine: Of the yaw that it faces.
-        sine: Of the same.
-        progress: How much of the path is done [points].
-        target: How much of it is to be done [points].
+        cosine: Cosine of its yaw.
+        sine: Sine of its yaw.
+        progress: Progress along the path [points].
+        target: Progress at the goal [points].
         away: Distance to the path [m].
-        ahead: How far ahead on the path the point is that it should face [m].
+        ahead: Distance along the path to the point that it should face [m].
         facing: c of eq. 8.
-        spacing: [m].
+        spacing: Distance of the points [m].
     """
     last = len(path) - 1
     goal = min(progress + ahead / spacing, float(last))

@@ -1,7 +1,6 @@
 """The compiled search for walks over blocks on which every foot stands.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used.
+Importing this module imports numba; import it where it is used.
 
 A clip is placed in whole blocks, whole levels and quarter turns. So a cell placement is four whole
 numbers: column, row, level, quarter turns. A foot that stands has a block and a recorded level. Its
