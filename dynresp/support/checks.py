@@ -42,10 +42,7 @@ def check_number(
     expected = "a whole number" if whole else "a number"
     if not isinstance(value, Integral if whole else Real) or isinstance(value, bool):
         raise UsageError(f"{name} must be {expected}, got {_shown(repr, value)}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
+    number = _as_float(value)
     # NaN fails this, too.
     if not low <= number <= high or (above_low and number == low):
         unit = unit and f" {unit}"
@@ -61,6 +58,27 @@ def check_number(
         raise UsageError(f"{name} must be {limits}, got {_shown(str, value)}")
 
 
+def check_vector(name: str, value: object, count: int, above: float = -math.inf) -> None:
+    """Refuse what is not a row of finite numbers.
+
+    Args:
+        name: What the row is called in the message.
+        value: What was given.
+        count: How many numbers it must have.
+        above: All must be larger than this.
+
+    Raises:
+        UsageError: It is not such a row; the message says what was given and expected.
+    """
+    try:
+        numbers = list(value)  # type: ignore[call-overload]
+    except TypeError:
+        numbers = []
+    if len(numbers) != count or not all(above < _as_float(x) <= LARGEST for x in numbers):
+        bound = "" if above == -math.inf else f" above {above:g}"
+        raise UsageError(f"{name} must be {count} finite numbers{bound}, got {_shown(repr, value)}")
+
+
 def check_numbers(settings: Any) -> None:
     """Refuse a dataclass whose fields of type `float` or `int` are not finite numbers.
 
@@ -74,6 +92,16 @@ def check_numbers(settings: Any) -> None:
         if str(field.type) in ("float", "int"):
             value = getattr(settings, field.name)
             check_number(field.name, value, whole=str(field.type) == "int")
+
+
+def _as_float(value: object) -> float:
+    """A number as a float: infinite if it is larger than any float, NaN if it is no number."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _shown(write: Callable[[object], str], value: object) -> str:

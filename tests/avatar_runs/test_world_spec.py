@@ -40,7 +40,7 @@ def test_a_world(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("bounds = [-1, -2, 10, 4.5]", "", "world.bounds is missing"),
         ("[-1, -2, 10, 4.5]", "[-1, -2, 10]", r"world.bounds: expected 4 numbers in brackets"),
@@ -49,17 +49,17 @@ def test_a_world(tmp_path: Path) -> None:
         ("[-1, -2, 10, 4.5]", "[-1e5, -1, 1e5, 1]", "sides of at most 400 m, got 200000 x 2 m"),
         ("[-1, -2, 10, 4.5]", "[0, 0, 400, 101]", "at most 40000 m2, got 40400 m2; cut"),
         ("[2, 1]", "[2, nan]", "box 1.size: expected 2 numbers"),
-        ("[2, 1]", "[2, -1]", "sizes of an obstacle must be above 0"),
+        ("[2, 1]", "[2, -1]", "half_sizes of an obstacle must be 2 finite numbers above 0"),
         ("size = [0.2, 3]", "sizes = [0.2, 3]", r"sizes is not a key of \[box\]"),
         ("height_m = 0.4", "height_m = true", "box 2.height_m: expected a number"),
     ],
 )
-def test_mistakes_are_told(tmp_path: Path, old: str, new: str, said: str) -> None:
-    with pytest.raises(SpecError, match=said):
+def test_wrong_worlds_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
         read_world(written(tmp_path, WORLD.replace(old, new, 1)))
 
 
-def test_one_bracket_is_told(tmp_path: Path) -> None:
+def test_a_box_needs_two_brackets(tmp_path: Path) -> None:
     text = WORLD[: WORLD.rindex("[[box]]")].replace("[[box]]", "[box]")
     with pytest.raises(SpecError, match=r"box: write \[\[box\]\], with two brackets on each side"):
         read_world(written(tmp_path, text))

@@ -74,7 +74,9 @@ def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, me
     middle_y = y + sine * ahead + cosine * aside
     cell = column * clearance.shape[1] + row
     for member in range(starts[cell], starts[cell + 1]):
-        if not _is_separate(middle_x, middle_y, cosine, sine, half_x, half_y, boxes[members[member]]):
+        if not _is_separate(
+            middle_x, middle_y, cosine, sine, half_x, half_y, boxes[members[member]]
+        ):
             return True
     return False
 

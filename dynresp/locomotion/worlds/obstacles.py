@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynresp.motion.character import POSE_SIZE, Character, as_poses
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.checks import check_number, check_vector
 from dynresp.support.errors import UsageError
 
 # Half the thickness of the walls around a world [m], too thick to pass through.
@@ -50,17 +51,10 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not (_are_finite(self.center, 2) and _are_finite((self.yaw,), 1)):
-            raise UsageError(
-                f"the place of an obstacle must be finite numbers, got "
-                f"{self.center!r}, {self.yaw!r}"
-            )
-        sizes_are_right = _are_finite(self.half_sizes, 2) and _are_finite((self.height,), 1)
-        if not (sizes_are_right and min(*self.half_sizes, self.height) > 0):
-            raise UsageError(
-                f"the sizes of an obstacle must be above 0, got half sizes {self.half_sizes!r} "
-                f"and height {self.height!r}"
-            )
+        check_vector("center of an obstacle", self.center, 2)
+        check_vector("half_sizes of an obstacle", self.half_sizes, 2, above=0.0)
+        check_number("yaw of an obstacle", self.yaw)
+        check_number("height of an obstacle", self.height, 0.0, above_low=True)
 
 
 @dataclass(frozen=True)
@@ -82,11 +76,7 @@ class World:
 
     def __post_init__(self) -> None:
         """Check the bounds."""
-        if not _are_finite(self.bounds, 4):
-            raise UsageError(
-                f"bounds must be (smallest x, smallest y, largest x, largest y), got "
-                f"{self.bounds!r}"
-            )
+        check_vector("bounds", self.bounds, 4)
         low_x, low_y, high_x, high_y = self.bounds
         if not (low_x < high_x and low_y < high_y):
             raise UsageError(
@@ -196,15 +186,6 @@ class World:
         for box in self.boxes:
             np.minimum(nearest, box_distance(points, box), out=nearest)
         return nearest
-
-
-def _are_finite(values: object, count: int) -> bool:
-    """Whether these are `count` finite numbers."""
-    try:
-        numbers = [float(value) for value in values]  # type: ignore[attr-defined]
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return len(numbers) == count and all(math.isfinite(number) for number in numbers)
 
 
 def box_distance(points: FloatArray, box: FloatArray) -> FloatArray:

@@ -20,6 +20,7 @@ from dynresp.motion.ground import CONTACT_GAP_S, CONTACT_HEIGHT, CONTACT_SPEED
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
+from dynresp.support.checks import check_number, check_vector
 from dynresp.support.errors import UsageError
 
 # (name, one end, the other end) of each bar [m], in the world of the motions as they are loaded
@@ -104,11 +105,9 @@ class Playground:
         if len(set(names)) < len(names):
             raise UsageError(f"each bar needs a different name, got {', '.join(sorted(names))}")
         for bar in self.bars:
-            if not (np.isfinite([*bar.start, *bar.stop]).all() and 0 < bar.radius < np.inf):
-                raise UsageError(
-                    f"bar {bar.name!r} must have finite ends and a radius above 0, got "
-                    f"{bar.start}, {bar.stop} and {bar.radius}"
-                )
+            check_vector(f"start of bar {bar.name!r}", bar.start, 3)
+            check_vector(f"stop of bar {bar.name!r}", bar.stop, 3)
+            check_number(f"radius of bar {bar.name!r}", bar.radius, 0.0, above_low=True)
 
     def nearest(self, points: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """The bar nearest to each of the points (..., 3): its index, and its axis' distance [m].

@@ -6,7 +6,6 @@ blocks of 24 inches and levels of 2.5 inches, a third of the paper's height of 7
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy.typing as npt
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.worlds.world_contacts import heights_above
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.checks import check_number, check_vector
 from dynresp.support.errors import UsageError
 
 BLOCK_M = 0.6096
@@ -53,11 +53,9 @@ class Terrain:
                 "the levels of a terrain must be whole numbers in a grid (columns, rows), "
                 f"got {levels.dtype} {levels.shape}"
             )
-        for name, value in (("block_m", self.block_m), ("level_m", self.level_m)):
-            if not (math.isfinite(value) and value > 0):
-                raise UsageError(f"{name} must be above 0, got {value}")
-        if not all(math.isfinite(v) for v in self.corner):
-            raise UsageError(f"a terrain must be at a finite place, got {self.corner}")
+        check_number("block_m", self.block_m, 0.0, above_low=True)
+        check_number("level_m", self.level_m, 0.0, above_low=True)
+        check_vector("corner of a terrain", self.corner, 2)
         levels.flags.writeable = False
         object.__setattr__(self, "levels", levels)
 

@@ -104,9 +104,9 @@ def test_no_body_touches_a_box_that_its_footprint_leaves_alone(
 
 def test_what_is_no_world() -> None:
     for box in (((0, math.nan), (1, 1)), ((0, 0), (0, 1)), ((0, 0), (1, math.inf))):
-        with pytest.raises(UsageError, match="obstacle"):
+        with pytest.raises(UsageError, match="of an obstacle must be 2 finite numbers"):
             Obstacle(*box)
-    with pytest.raises(UsageError, match="height"):
+    with pytest.raises(UsageError, match="height of an obstacle must be above 0"):
         Obstacle((0, 0), (1, 1), height=-1.0)
     with pytest.raises(UsageError, match="bounds must be"):
         World((1.0, 0.0, 0.0, 2.0))
@@ -114,9 +114,11 @@ def test_what_is_no_world() -> None:
 
 @pytest.mark.parametrize("wrong", ["ab", None, 3.0, (1.0,), (1.0, "x"), [(1.0, 2.0)], (1, 2, 3)])
 def test_what_is_no_box_and_no_bounds(wrong: object) -> None:
-    with pytest.raises(UsageError, match="must be finite numbers, got"):
+    with pytest.raises(UsageError, match="center of an obstacle must be 2 finite numbers, got"):
         Obstacle(wrong, (1.0, 1.0))  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="sizes of an obstacle must be above 0"):
+    with pytest.raises(
+        UsageError, match="half_sizes of an obstacle must be 2 finite numbers above 0"
+    ):
         Obstacle((0.0, 0.0), wrong)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="bounds must be"):
         World(wrong)  # type: ignore[arg-type]

@@ -43,7 +43,7 @@ def test_bars_that_make_no_sense_are_refused() -> None:
     bar = Bar("bar", (0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
     with pytest.raises(UsageError, match="different name"):
         Playground((bar, bar))
-    with pytest.raises(UsageError, match="finite ends"):
+    with pytest.raises(UsageError, match="start of bar 'bar' must be 3 finite numbers"):
         Playground((Bar("bar", (0.0, 0.0, np.nan), (1.0, 0.0, 1.0)),))
     with pytest.raises(UsageError, match="give it bars"):
         Playground(()).nearest(np.zeros(3))

@@ -62,7 +62,7 @@ def test_levels_that_are_no_grid_of_whole_numbers_are_refused(levels: np.ndarray
 def test_sizes_that_make_no_sense_are_refused() -> None:
     with pytest.raises(UsageError, match="block_m must be above 0"):
         Terrain(LEVELS, block_m=0.0)
-    with pytest.raises(UsageError, match="finite place"):
+    with pytest.raises(UsageError, match="corner of a terrain must be 2 finite numbers"):
         Terrain(LEVELS, corner=(np.nan, 0.0))
     with pytest.raises(UsageError, match="one column and one row"):
         Terrain.random(np.random.default_rng(0), 0, 3)
