@@ -20,7 +20,10 @@ from dynresp.response.hit_simulation import HitBatch, HitStage
 from dynresp.response.look_ahead import look_ahead_of
 from dynresp.response.response import Response, ResponseConfig
 from dynresp.response.search.full_search_choice import FullSearchChooser
-from dynresp.response.transition.choice_to_motion import ending, finish
+from dynresp.response.transition.choice_to_motion import (
+    blend_into_choice,
+    simulate_to_blend_end,
+)
 from dynresp.support.errors import MotionError
 
 
@@ -94,7 +97,7 @@ class Responder:
         found = self.chooser.choose(seen)
         choices = {int(row): choice for row, choice in zip(seen.rows, found, strict=True)}
         tell("finishing", 0, count)
-        final = finish(batch.simulation, choices, self.config.transition)
+        final = simulate_to_blend_end(batch.simulation, choices, self.config.transition)
         responses = [
             self._compose(base, prepared, trace, choices.get(row), final.get(row))
             for row, (base, prepared, trace) in enumerate(
@@ -138,7 +141,9 @@ class Responder:
         assert trace.contact is not None
         length = self.config.transition.blend_frames(base.fps)
         out = trace.contact.frame + choice.exit
-        end = ending(self.character, self.config, final.poses[out : out + length + 1], choice)
+        end = blend_into_choice(
+            self.character, self.config, final.poses[out : out + length + 1], choice
+        )
         poses = np.concatenate([before, final.poses[:out], end.poses])
         return replace(
             whole,
@@ -151,8 +156,8 @@ class Responder:
             error=choice.error,
             errors=choice.errors,
             entered_motion=choice.motion,
-            simulated_after_exit=end.left,
-            placed_before_end=end.joined,
+            simulated_after_exit=end.simulated_after_exit,
+            placed_before_end=end.placed_before_end,
             impactor=_impactor_track(final, start, len(poses)),
         )
 

@@ -24,7 +24,10 @@ from dynresp.response.runtime.dynamic_responder import (
     SimulatedHit,
 )
 from dynresp.response.search.full_search_choice import FullSearchChooser
-from dynresp.response.transition.choice_to_motion import ending, finish
+from dynresp.response.transition.choice_to_motion import (
+    blend_into_choice,
+    simulate_to_blend_end,
+)
 from dynresp.response.transition.transition import blend_onto, place_on
 from dynresp.support.errors import MotionError, UsageError
 
@@ -189,7 +192,8 @@ class Crowd:
             responder.add_event(EventKind.CHOSEN, contact_frame, choice)
             if self.config.transition.second_pass:
                 # Everything after contact is simulated again, towards the choice.
-                hit.trace = finish(simulation, {i: choice}, self.config.transition)[i]
+                transition = self.config.transition
+                hit.trace = simulate_to_blend_end(simulation, {i: choice}, transition)[i]
                 if hit.trace.diverged is not None:
                     self._give_up(i, EventKind.DIVERGED)
                     continue
@@ -204,14 +208,14 @@ class Crowd:
         final = hit.trace
         if not transition.second_pass:
             simulation = self._simulations[hit.setup.impact.kind]
-            final = finish(simulation, {i: choice}, transition)[i]
+            final = simulate_to_blend_end(simulation, {i: choice}, transition)[i]
         assert final is not None
         if final.diverged is not None:
             self._give_up(i, EventKind.DIVERGED)
             return
         out = hit.exit - hit.start
         simulated = final.poses[out : out + transition.blend_frames(self.config.physics.fps) + 1]
-        end = ending(self._character, self.config, simulated, choice)
+        end = blend_into_choice(self._character, self.config, simulated, choice)
         hit.end = hit.exit + transition.blend_frames(self.config.physics.fps)
         responder.enter(choice, simulated[0], end.poses)
         responder.add_event(EventKind.BLEND_BEGUN, hit.exit)

@@ -1,4 +1,4 @@
-"""From a choice to its motion: the rest of the simulation, the blend, and the reaction after it."""
+"""Turns a choice into motion: the rest of the simulation, the blend, and what follows it."""
 
 from __future__ import annotations
 
@@ -29,42 +29,44 @@ from dynresp.response.transition.transition import (
 
 Flags: TypeAlias = npt.NDArray[np.bool_]
 
-# Sine of the angle to the ground from which on the line from ankle to hip is that of a leg to stand
-# on.
-_STEEP = 0.5
-# A foot whose stillest point goes faster is dragged on purpose: it is not held still [m/s].
-_DRAGGED = 0.25
+# A leg can carry if the line from ankle to hip rises from the ground by an angle with at least this
+# sine (30 degrees).
+_MIN_LEG_SINE = 0.5
+# A foot whose stillest point moves faster than this [m/s] is dragged on purpose, so it is not held
+# still.
+_DRAG_SPEED = 0.25
 
 
 @dataclass(frozen=True)
-class Ending:
-    """What comes after the exit.
+class MotionAfterExit:
+    """The motion from the exit on.
 
     Attributes:
-        poses: (frames, 59) from the exit on: the blend, whose first pose is the simulated one,
-            and the motion entered, to its end; feet that stand in the blend do not slide.
-        left: (59,) where the simulation was one frame after the exit.
-        joined: (59,) where the motion entered was one frame before the blend's end, lowered as it
-            is at the end for feet to reach the ground.
+        poses: (frames, 59) the blend, whose first pose is the simulated one, and then the motion
+            entered (the reaction, or the base motion) to its end. Feet that stand in the blend do
+            not slide.
+        simulated_after_exit: (59,) the simulated pose one frame after the exit.
+        placed_before_end: (59,) the pose of the motion entered one frame before the blend's end.
+            It is lowered as much as the pose at the end is for feet to reach the ground.
     """
 
     poses: FloatArray
-    left: FloatArray
-    joined: FloatArray
+    simulated_after_exit: FloatArray
+    placed_before_end: FloatArray
 
 
-def finish(
+def simulate_to_blend_end(
     simulation: Simulation, choices: Mapping[int, Choice], transition: TransitionConfig
 ) -> dict[int, Trace]:
-    """Take simulations back and run them on until their blends end, tracking what was chosen.
+    """Take simulations back and run them until their blends end; the servos track the choices.
 
     Args:
-        simulation: Where they were looked ahead; all have been hit.
-        choices: What was chosen for each.
-        transition: With a second pass they are taken back to the contact, else to the exit.
+        simulation: The simulation that has looked ahead; all its characters have been hit.
+        choices: The choice for each row of the simulation.
+        transition: With `second_pass` the simulations go back to the contact, else to the exit.
 
     Returns:
-        For each its whole trace.
+        The whole trace of each row.
     """
     length = transition.blend_frames(simulation.fps)
     final: dict[int, Trace] = {}
@@ -78,11 +80,11 @@ def finish(
         back = contact.frame if transition.second_pass else exit_frame
         lead = exit_frame - back
         base = simulation.setups[i].base
-        # As far as the servos read ahead.
+        # Including the frames that the servos read ahead.
         stop = exit_frame + length + simulation.read_ahead
-        until = np.minimum(np.arange(back, stop), len(base) - 1)
+        base_frames = np.minimum(np.arange(back, stop), len(base) - 1)
         targets[i] = blended_targets(
-            base[until], choice.motion.poses, choice.entry, lead, lead + length
+            base[base_frames], choice.motion.poses, choice.entry, lead, lead + length
         )
         frames[i] = back
         groups.setdefault(lead + length, []).append(i)
@@ -94,107 +96,111 @@ def finish(
     return final
 
 
-def ending(
+def blend_into_choice(
     character: Character, config: ResponseConfig, simulated: FloatArray, choice: Choice
-) -> Ending:
-    """Blend a simulation onto what was chosen, and let that go on.
+) -> MotionAfterExit:
+    """Blend a simulation onto the motion that was chosen, and append the rest of that motion.
 
     Args:
         character: The character.
-        config: Length of the blend, and how long a base motion is shown to go on.
-        simulated: (blend + 1, 59) from the exit on.
-        choice: What was chosen.
+        config: Length of the blend, and how long the base motion goes on (`carry_on_s`).
+        simulated: (blend + 1, 59) the simulated poses from the exit on.
+        choice: The choice.
     """
     fps = choice.motion.fps
     length = config.transition.blend_frames(fps)
-    left = len(choice.motion) - choice.entry
+    count = len(choice.motion) - choice.entry
     if choice.name == CARRY_ON:
-        left = min(left, length + 1 + round(config.carry_on_s * fps))
-    # Where a motion ends before the blend does, its last pose holds.
-    at = choice.entry + np.arange(max(left, length + 2))
-    entered = choice.motion.poses[np.minimum(at, len(choice.motion) - 1)]
+        count = min(count, length + 1 + round(config.carry_on_s * fps))
+    # If a motion ends before the blend does, its last pose holds.
+    frames = choice.entry + np.arange(max(count, length + 2))
+    entered = choice.motion.poses[np.minimum(frames, len(choice.motion) - 1)]
     placed = place_on(entered, 0, simulated[0])
-    # Halfway between two poses that stand, legs can reach below the floor.
+    # Between two standing poses legs can reach below the floor.
     blend = raise_above(character, blend_onto(simulated, placed[: length + 1]), fps)
     poses = np.concatenate([blend, placed[length + 1 :]])
-    going_on = choice.name == CARRY_ON
-    fitted = _fitted(character, fps, simulated, placed, poses, going_on)
-    joined = placed[length - 1].copy()
-    # The root may be lowered by now, and stay so for a while.
-    joined[2] += fitted[length, 2] - placed[length, 2]
-    return Ending(fitted, simulated[1], joined)
+    continues = choice.name == CARRY_ON
+    fitted = _fit_feet(character, fps, simulated, placed, poses, continues)
+    placed_before_end = placed[length - 1].copy()
+    # Fitting the feet may have lowered the root at the blend's end, and keeps it so for a while.
+    placed_before_end[2] += fitted[length, 2] - placed[length, 2]
+    return MotionAfterExit(fitted, simulated[1], placed_before_end)
 
 
-def _fitted(
+def _fit_feet(
     character: Character,
     fps: float,
     simulated: FloatArray,
     placed: FloatArray,
     poses: FloatArray,
-    going_on: bool,
+    continues: bool,
 ) -> FloatArray:
-    """A blend, and what follows it, whose feet do not slide on account of the blend.
+    """Correct a blend and what follows it, so that the blend makes no foot slide.
 
     Args:
         character: The character.
         fps: Frame rate [1/s].
-        simulated: (blend + 1, 59) from the exit on.
-        placed: (frames, 59) the motion entered, from the exit on.
+        simulated: (blend + 1, 59) the simulated poses from the exit on.
+        placed: (frames, 59) the motion entered, placed, from the exit on.
         poses: (frames, 59) the blend of the two, and then the motion entered.
-        going_on: Whether that goes on after the last frame, so that nothing may be corrected there.
+        continues: Whether the motion goes on after the last frame; then its last frames are not
+            corrected.
     """
     length = len(simulated) - 1
-    before, entered, blended = (_standing(character, x, fps) for x in (simulated, placed, poses))
-    contacts = _stances(before, entered, blended, entered & ~_dragged(character, placed, fps))
-    if going_on:
+    before, entered, blended = (
+        _standing_feet(character, x, fps) for x in (simulated, placed, poses)
+    )
+    still = entered & ~_dragged_feet(character, placed, fps)
+    contacts = _stances(before, entered, blended, still)
+    if continues:
         contacts[-fading_frames(fps) :] = False
     source = np.concatenate([simulated[:1], placed[1:]])
     composed = ComposedMotion(poses, source, contacts, [1], fps, length / fps, fitted=poses[:1])
-    # A leg that is bent may reach below the floor in one who falls.
+    # When a character falls, a bent leg may reach below the floor.
     return raise_above(character, fit_feet(character, composed), fps)
 
 
 def _stances(before: Flags, entered: Flags, blended: Flags, still: Flags) -> Flags:
-    """When feet are to stand from the exit on (frames, 2).
+    """In which frames each foot must stand, from the exit on (frames, 2).
 
     Args:
-        before: Whether they stand in the simulation, from the exit to the blend's end.
-        entered: Whether they stand in the motion entered.
-        blended: Whether they stand in the blend of the two, and then in the motion entered.
-        still: Whether they stand in the motion entered and are not dragged.
+        before: (blend + 1, 2) whether it stands in the simulation.
+        entered: (frames, 2) whether it stands in the motion entered.
+        blended: (frames, 2) whether it stands in the blend, and then in the motion entered.
+        still: (frames, 2) whether it stands in the motion entered and is not dragged.
     """
     entered, blended = entered.copy(), blended.copy()
     entered[0] = blended[0] = before[0]
-    # A foot that stands at the exit goes on standing for as long as either says so. One that does
-    # not stands as soon as both do: the motion entered may have it on the ground where the
-    # simulation still has it in the air.
+    # A foot that stands at the exit keeps standing as long as one of the two says so. A foot that
+    # does not stand at the exit stands as soon as both say so: the motion entered may have it on
+    # the ground while the simulation still has it in the air.
     goes_on = np.logical_and.accumulate(entered) | np.logical_and.accumulate(blended)
     stances: Flags = goes_on | (entered & blended)
-    # After the blend those that go on do so to their end. The recording's own are held as well:
-    # else a correction that fades would drag them.
+    # After the blend such a stance lasts to its end. Stances of the recording are held, too;
+    # otherwise a correction that fades out would drag those feet.
     length = len(before) - 1
     stances[length:] = np.logical_and.accumulate(stances[length:]) | still[length:]
     return stances
 
 
-def _dragged(character: Character, poses: FloatArray, fps: float) -> Flags:
-    """Which feet slide faster over the ground than any that is to stand (frames, 2)."""
-    slides = foot_slides(character, character.kinematics(poses)) * fps > _DRAGGED
-    beside = np.zeros((1, len(FEET)), dtype=bool)
-    dragged: Flags = np.concatenate([slides, beside]) | np.concatenate([beside, slides])
+def _dragged_feet(character: Character, poses: FloatArray, fps: float) -> Flags:
+    """Which feet slide over the ground faster than `_DRAG_SPEED` (frames, 2)."""
+    slides = foot_slides(character, character.kinematics(poses)) * fps > _DRAG_SPEED
+    none = np.zeros((1, len(FEET)), dtype=bool)
+    dragged: Flags = np.concatenate([slides, none]) | np.concatenate([none, slides])
     return dragged
 
 
-def _standing(character: Character, poses: FloatArray, fps: float) -> Flags:
-    """Which feet stand, and may carry, in poses (frames, 59): (frames, 2).
+def _standing_feet(character: Character, poses: FloatArray, fps: float) -> Flags:
+    """Which feet stand and can carry the body, in poses (frames, 59): (frames, 2).
 
-    The legs of one who has fallen do not carry.
+    The legs of a character that has fallen cannot.
     """
     states = character.kinematics(poses)
     steep = []
     for side in FEET:
         hip, ankle = (states.positions[:, character.body(f"{side}_{x}")] for x in ("thigh", "foot"))
-        way = hip - ankle
-        steep.append(way[:, 2] >= _STEEP * np.linalg.norm(way, axis=1))
+        leg = hip - ankle
+        steep.append(leg[:, 2] >= _MIN_LEG_SINE * np.linalg.norm(leg, axis=1))
     flags: Flags = foot_contacts(character, states, fps) & np.stack(steep, axis=1)
     return flags

@@ -1,9 +1,8 @@
-"""From the simulation back to motion capture: targets that lead there, and the blend.
+"""The blend from the simulation to a recorded motion, and the servo targets that lead there.
 
-Zordan et al. 2007, section 6: from the moment the reaction and its timing are known, the servos
-track a blend of the motion before and the motion to come, and the simulated motion is brought onto
-the reaction over a fixed length: the root by straight lines, rotations by slerp, with an
-ease-in/ease-out weight in time.
+Zordan et al. 2007, section 6: once the reaction and its timing are known, the servos track a blend
+of the base motion and the reaction, and the simulated motion is blended onto the reaction over a
+fixed time: the root along straight lines, rotations by slerp, with an ease-in/ease-out weight.
 """
 
 from __future__ import annotations
@@ -21,12 +20,12 @@ from dynresp.support.errors import UsageError
 
 @dataclass(frozen=True)
 class TransitionConfig:
-    """How the way back is made.
+    """Settings of the blend.
 
     Attributes:
-        blend_s: Length of the blend [s].
-        second_pass: Simulate again from the contact on, tracking all the way towards the reaction
-            that was found (Zordan et al. 2005); without, only from the exit on.
+        blend_s: Length of the blend [s], above 0.
+        second_pass: Whether to simulate again from the contact on, with servos that track towards
+            the chosen reaction (Zordan et al. 2005); else only from the exit on.
     """
 
     blend_s: float = 1.0 / 3.0
@@ -42,67 +41,67 @@ class TransitionConfig:
             raise UsageError(f"blend_s must be above 0, got {self.blend_s}")
 
     def blend_frames(self, fps: float) -> int:
-        """Frames from the last that is wholly simulated to the first that is wholly reaction."""
+        """Number of frames from the exit, still simulated, to the first frame of reaction alone."""
         return max(1, round(self.blend_s * fps))
 
 
 def place_on(reaction: FloatArray, entry: int, pose: FloatArray) -> FloatArray:
-    """A reaction moved on the ground so that its entry frame stands and faces where a pose does.
+    """Move a reaction on the ground so that its entry frame stands and faces as a pose does.
 
     Args:
-        reaction: (frames, 59).
-        entry: The frame entered.
-        pose: (59,) where the character is.
+        reaction: (frames, 59) poses.
+        entry: The frame of the reaction that is placed on the pose.
+        pose: (59,) the pose of the character.
 
     Returns:
-        (frames, 59): turned about the vertical and shifted on the ground alone, as in the search.
+        (frames, 59) the poses, turned about the vertical and shifted on the ground only, as in the
+        full search.
     """
     entered = reaction[entry]
     turn = float(rotations.yaw_of(pose[ROOT_QUAT]) - rotations.yaw_of(entered[ROOT_QUAT]))
-    now = rotations.rotate(rotations.from_yaw(turn), entered[ROOT])
-    return move_poses(reaction, turn, (pose[0] - now[0], pose[1] - now[1], 0.0))
+    turned = rotations.rotate(rotations.from_yaw(turn), entered[ROOT])
+    return move_poses(reaction, turn, (pose[0] - turned[0], pose[1] - turned[1], 0.0))
 
 
 def blended_targets(
     base: FloatArray, reaction: FloatArray, entry: int, start: int, end: int
 ) -> FloatArray:
-    """What the servos track on the way from the base motion to the reaction.
+    """Servo targets that lead from the base motion to the reaction.
 
     Args:
-        base: (n, 59) the base motion, frame by frame from where the targets begin.
-        reaction: (frames, 59); its frame `entry` is due at frame `start` of the targets' clock
-            where that is not negative, and else its later frames are.
+        base: (n, 59) the base motion from the first target on.
+        reaction: (frames, 59) poses; frame `entry` is due at target `start`.
         entry: The frame of the reaction that is due at the exit.
-        start: The exit, counted from where the targets begin.
-        end: Where the targets are the reaction alone, likewise.
+        start: The exit, counted in targets; negative if it is before the first target.
+        end: The first target that is the reaction alone.
 
     Returns:
-        (n, 59). The blend begins with the first target and ends at `end`.
+        (n, 59) targets; the blend begins with the first and ends at `end`.
     """
     at = np.clip(entry + np.arange(len(base)) - start, 0, len(reaction) - 1)
     return _blend(base, reaction[at], rotations.ease(np.arange(len(base)) / end))
 
 
 def blend_onto(simulated: FloatArray, reaction: FloatArray) -> FloatArray:
-    """The simulated motion brought onto the reaction.
+    """Blend the simulated motion onto the reaction.
 
     Args:
-        simulated: (n + 1, 59) from the exit on.
-        reaction: (n + 1, 59) from the entry on, placed.
+        simulated: (n + 1, 59) simulated poses from the exit on.
+        reaction: (n + 1, 59) poses of the reaction from the entry on, placed.
 
     Returns:
-        (n + 1, 59): the first pose is the simulated one, the last the reaction's.
+        (n + 1, 59) poses; the first is the simulated one, the last the reaction's.
     """
     weight = rotations.ease(np.arange(len(simulated)) / max(len(simulated) - 1, 1))
     return _blend(simulated, reaction, weight)
 
 
 def _blend(a: FloatArray, b: FloatArray, weight: FloatArray) -> FloatArray:
-    """Poses from a to b (frames, 59): the root by straight lines, rotations by slerp.
+    """Blend poses a to b (frames, 59): the root along straight lines, rotations by slerp.
 
-    Each rotation goes one way round, the shorter one at the first frame: where two motions turn
-    apart by more than half a turn, slerp frame by frame would leap to the other way. Quaternions
-    are continuous in sign.
+    Each rotation keeps the direction that is shorter at the first frame. Slerp frame by frame would
+    jump to the other direction where two motions differ by more than half a turn. Quaternions are
+    continuous in sign.
     """
     out = np.empty_like(a)
     out[:, ROOT] = a[:, ROOT] + weight[:, None] * (b[:, ROOT] - a[:, ROOT])

@@ -1,4 +1,4 @@
-"""The blend and what follows it: feet that stand stay where they are."""
+"""The blend and what follows it: standing feet stay in place."""
 
 import numpy as np
 import pytest
@@ -11,25 +11,27 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.response.choice import Choice
 from dynresp.response.response import CARRY_ON, Response, ResponseConfig
 from dynresp.response.response_quality import measure
-from dynresp.response.transition.choice_to_motion import Ending, ending
+from dynresp.response.transition.choice_to_motion import MotionAfterExit, blend_into_choice
 from tests.physics.samples import FPS, standing
 
 LENGTH = ResponseConfig().transition.blend_frames(FPS)
 
 
-def _crouching(character: Character, seconds: float, apart: float = 0.0) -> Motion:
-    """Somebody who stands with bent knees, the left foot ahead by so much [m]."""
+def _crouching(character: Character, seconds: float, ahead: float = 0.0) -> Motion:
+    """Standing with bent knees, the left foot ahead by so much [m]."""
     poses = standing(character, seconds).poses.copy()
     ankles = legs.ankle_positions(character, character.kinematics(poses))
-    ankles[:, 0, 0] += 0.5 * apart
-    ankles[:, 1, 0] -= 0.5 * apart
+    ankles[:, 0, 0] += 0.5 * ahead
+    ankles[:, 1, 0] -= 0.5 * ahead
     poses[:, 2] -= 0.08
     return Motion(legs.place_ankles(character, poses, ankles), FPS, "crouching")
 
 
-def _ended(character: Character, simulated: FloatArray, entered: Motion, name: str) -> Ending:
+def _ended(
+    character: Character, simulated: FloatArray, entered: Motion, name: str
+) -> MotionAfterExit:
     choice = Choice(name, entered, 5, 0, 0.0, {})
-    return ending(character, ResponseConfig(), simulated, choice)
+    return blend_into_choice(character, ResponseConfig(), simulated, choice)
 
 
 def _ankles(character: Character, poses: FloatArray) -> FloatArray:
@@ -37,19 +39,19 @@ def _ankles(character: Character, poses: FloatArray) -> FloatArray:
 
 
 class TestStandingFeet:
-    """From one who stands onto one who stands otherwise."""
+    """A blend between two ways to stand."""
 
-    @pytest.mark.parametrize("apart", [0.0, 0.1, 0.25])
+    @pytest.mark.parametrize("ahead", [0.0, 0.1, 0.25])
     def test_they_stay_through_the_blend_and_after(
-        self, character: Character, apart: float
+        self, character: Character, ahead: float
     ) -> None:
         simulated = _crouching(character, 1.0).poses[: LENGTH + 1]
-        end = _ended(character, simulated, _crouching(character, 3.0, apart), "standing")
+        end = _ended(character, simulated, _crouching(character, 3.0, ahead), "standing")
         gone = _ankles(character, end.poses) - _ankles(character, simulated[:1])
         np.testing.assert_allclose(gone, 0.0, atol=2e-3)
 
-    def test_one_who_carries_on_is_in_place_again_at_the_end(self, character: Character) -> None:
-        """After it the base motion goes on alone."""
+    def test_without_a_reaction_the_end_is_the_base_motion(self, character: Character) -> None:
+        """After the blend the base motion goes on alone."""
         simulated = _crouching(character, 1.0).poses[: LENGTH + 1]
         base = _crouching(character, 6.0, 0.1)
         end = _ended(character, simulated, base, CARRY_ON)
@@ -64,14 +66,14 @@ class TestStandingFeet:
         ankles[:, 0] += (0.1, 0.0, 0.15)
         raised = legs.place_ankles(character, simulated, ankles)
         end = _ended(character, raised, _crouching(character, 3.0), "standing")
-        way = np.diff(_ankles(character, end.poses)[:, 0], axis=0)
-        assert np.linalg.norm(way, axis=1).max() < 0.06
+        steps = np.diff(_ankles(character, end.poses)[:, 0], axis=0)
+        assert np.linalg.norm(steps, axis=1).max() < 0.06
         assert _ankles(character, end.poses)[-1, 0, 2] == pytest.approx(0.07, abs=0.01)
 
     def test_steps_after_the_blend_do_not_slide_while_a_correction_fades(
         self, character: Character
     ) -> None:
-        """The left foot stands apart, and is put down beside the other soon after the blend."""
+        """The left foot stands ahead, and is put down beside the other soon after the blend."""
         simulated = _crouching(character, 1.0).poses[: LENGTH + 1]
         entered = _crouching(character, 4.0, 0.25)
         ankles = _ankles(character, entered.poses)
@@ -81,12 +83,12 @@ class TestStandingFeet:
         stepping = Motion(legs.place_ankles(character, entered.poses, ankles), FPS, "stepping")
         for name in ("stepping", CARRY_ON):
             end = _ended(character, simulated, stepping, name)
-            way = np.diff(_ankles(character, end.poses)[:, 0, :2], axis=0)
-            # From where it stands again until it is let go, where it carries on.
-            after = np.linalg.norm(way, axis=1)[LENGTH + 17 : LENGTH + 36]
+            steps = np.diff(_ankles(character, end.poses)[:, 0, :2], axis=0)
+            # While it stands again, until its correction ends (without a reaction).
+            after = np.linalg.norm(steps, axis=1)[LENGTH + 17 : LENGTH + 36]
             assert after.max() < 1e-3
 
-    def test_one_who_lies_has_no_standing_feet(self, character: Character) -> None:
+    def test_a_lying_character_has_no_standing_feet(self, character: Character) -> None:
         """Legs that lie on the ground are blended as before."""
         poses = standing(character, 3.0).poses.copy()
         poses[:, 3:7] = np.array([1.0, 0.0, -1.0, 0.0]) / np.sqrt(2.0)
@@ -98,14 +100,16 @@ class TestStandingFeet:
         np.testing.assert_allclose(end.poses[LENGTH + 1 :, 7:], lying.poses[LENGTH + 1 :, 7:])
 
 
-def test_answers_hardly_slide_in_the_blend(character: Character, responses: list[Response]) -> None:
+def test_responses_hardly_slide_in_the_blend(
+    character: Character, responses: list[Response]
+) -> None:
     found = [measure(response, character) for response in responses]
     slid = [quality.foot_skate_blend_m for quality in found if quality is not None]
     assert np.median(slid) < 0.02
 
 
 def test_a_stance_is_measured_over_both_seams(character: Character) -> None:
-    """The whole way from the simulation to the end of what is entered, in one stance."""
+    """One stance lasts from the simulation to the end of the motion entered."""
     simulated = _crouching(character, 1.0).poses[: LENGTH + 1]
     end = _ended(character, simulated, _crouching(character, 2.0, 0.15), "standing")
     contacts = np.ones((len(end.poses), len(FEET)), dtype=bool)
