@@ -1,9 +1,9 @@
-"""Time alignment: when to leave the simulation, and where to enter the one reaction chosen.
+"""Time alignment: find exit and entry of one reaction, fast and between frames.
 
-Zordan et al. 2007 (section 5): the window error is sampled sparsely along both times, in sets that
-begin at the start of the simulation and are cut when further sets do not improve; a descent by
-BFGS from the best sample, with interpolated frames, finds the times. The exhaustive alignment
-beside it is `oracle.search`, which tries every pair of whole frames.
+Zordan et al. 2007 (section 5): the mismatch (window error) is sampled sparsely along both times, in
+sets that begin at the start of the simulation, until further sets do not improve it. Then a descent
+by BFGS from the best sample, with interpolated frames, finds the times. `full_search.search` aligns
+by trying every pair of whole frames.
 """
 
 from __future__ import annotations
@@ -18,7 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.rotations import FloatArray
-from dynresp.response.alignment.alignment_result import Alignment, AlignmentConfig, Alignments
+from dynresp.response.alignment.alignment_result import (
+    LEAST_GAIN,
+    Alignment,
+    AlignmentConfig,
+    Alignments,
+)
 from dynresp.response.windows.window_config import WindowErrorConfig
 from dynresp.response.windows.windows import (
     LANES,
@@ -33,25 +38,24 @@ __all__ = ["Aligner", "Alignment", "AlignmentConfig", "Alignments"]
 _Clip = npt.NDArray[np.float32]
 
 _TRACE = "simulated trace"
-# Entries that are tried beside one that was shifted to a whole exit frame; itself first, so that of
-# equals it is kept.
-_NEARBY = np.array([0.0, -1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])
+# Shifts of an entry [frames] that are tried after its exit was moved to a whole frame. Zero is
+# first, so that it wins among equals.
+_ENTRY_SHIFTS = np.array([0.0, -1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])
 
 
 class Aligner:
-    """Aligns reactions with simulated traces; the reactions are laid out once.
+    """Aligns reactions with simulated traces; the reactions are prepared once.
 
-    To fit a trace that grows with the simulation, align what is there and go on simulating while
-    the result is not `complete`: a longer trace leaves a complete result as it is, to the last
-    bit.
+    To align with a simulation that still runs, align what there is, and simulate more while the
+    result is not `complete`. A longer trace does not change a complete result by a single bit.
 
-    Making one costs some tens of microseconds a reaction, so a track that is met once, such as
-    the base motion around the hit, can have an aligner of its own.
+    An aligner takes some tens of microseconds a reaction to make, so a track that is needed once,
+    such as the base motion around the hit, can have its own.
 
     Attributes:
         names: Names of the reactions.
-        window: The window error and the bounds of the exits.
-        config: Quality against speed.
+        window: Settings of the mismatch, and the bounds of the exits.
+        config: Settings of the alignment.
     """
 
     def __init__(
@@ -60,33 +64,32 @@ class Aligner:
         window: WindowErrorConfig,
         config: AlignmentConfig | None = None,
     ) -> None:
-        """Lay out the reactions.
+        """Prepare the reactions.
 
         Args:
-            tracks: The reactions, at the frame rate of `window`.
-            window: The window error; its exits bound the times at which the simulation is left.
-                Entries are bounded by each track's `entry_range`; its `entry_step_s` is for the
-                exhaustive search alone.
-            config: Settings.
+            tracks: The reactions, at the frame rate of `window`; each has the range of its entries.
+            window: Settings of the mismatch, and the range of the exits. Its `entry_step_s` has no
+                effect here.
+            config: Settings of the alignment.
 
         Raises:
-            MotionError: The tracks make no library (`windows.library_windows`).
+            MotionError: `windows.library_windows` refuses the tracks.
         """
         self.names = tuple(track.name for track in tracks)
         self.window = window
         self.config = config = config or AlignmentConfig()
         self._rows = {name: row for row, name in enumerate(self.names)}
-        laid = [self._lay_out(track) for track in tracks]
-        alike = {len(track.positions[0]) for track, one in zip(tracks, laid, strict=True) if one}
-        if None in laid or len(self._rows) < len(tracks) or len(alike) != 1:
-            library_windows(tracks, window)
-            raise MotionError("a quaternion of the reactions is not of unit length, w x y z.")
-        self._bodies = alike.pop()
-        kept = [one for one in laid if one]
-        self._clips = np.concatenate([clip for clip, *_ in kept])
-        ends = np.cumsum([len(clip) for clip, *_ in kept])
-        self._places = np.array(
-            [[end - len(clip), *place] for end, (clip, *place) in zip(ends, kept, strict=True)],
+        made = [self._lay_out(track) for track in tracks]
+        bodies = {len(track.positions[0]) for track, one in zip(tracks, made, strict=True) if one}
+        if None in made or len(self._rows) < len(tracks) or len(bodies) != 1:
+            library_windows(tracks, window)  # Raises an error that says what is wrong.
+            raise MotionError("a quaternion of the reactions is not of unit length, w x y z")
+        self._bodies = bodies.pop()
+        clips = [one for one in made if one]
+        self._clips = np.concatenate([clip for clip, *_ in clips])
+        ends = np.cumsum([len(clip) for clip, *_ in clips])
+        self._layouts = np.array(
+            [[end - len(clip), *layout] for end, (clip, *layout) in zip(ends, clips, strict=True)],
             np.int64,
         )
         self._step = config.step_s * window.fps
@@ -96,9 +99,9 @@ class Aligner:
             config.sets_without_gain,
             config.starts,
             config.most_iterations if config.refine else 0,
-            config.least_gain,
+            LEAST_GAIN,
         )
-        self._clips.flags.writeable = self._places.flags.writeable = False
+        self._clips.flags.writeable = self._layouts.flags.writeable = False
 
     def row(self, reaction: str) -> int:
         """Index of a reaction in `names`.
@@ -126,8 +129,8 @@ class Aligner:
 
         Raises:
             UnknownNameError: There is no reaction of one of the names.
-            MotionError: Shapes do not fit, the trace is too short for the earliest exit, or what
-                is looked at of it is not finite or not of unit length.
+            MotionError: Shapes do not fit, the trace is too short for the earliest exit, or the
+                part of it that is used is not finite or not of unit length.
         """
         position, quaternion = self._trace(positions, quaternions, 3)
         rows = np.array([[self.row(name) for name in reactions]], np.int64)
@@ -142,7 +145,7 @@ class Aligner:
     def align_many(
         self, positions: npt.ArrayLike, quaternions: npt.ArrayLike, rows: npt.ArrayLike
     ) -> Alignments:
-        """Align many traces of one length, bitwise as `align` would one by one.
+        """Align many traces of one length, with the bits that `align` would give for each.
 
         Args:
             positions: (traces, frames, bodies, 3), as for `align`.
@@ -163,7 +166,7 @@ class Aligner:
             raise MotionError(
                 f"rows has shape {chosen.shape} and type {chosen.dtype}; expected a whole number "
                 f"from 0 to {len(self.names) - 1}, or a row of them, for each of {len(position)} "
-                "traces."
+                "traces"
             )
         chosen = chosen.astype(np.int64)
         found = self._align(
@@ -191,29 +194,29 @@ class Aligner:
         exit_frames: npt.ArrayLike,
         entry_frames: npt.ArrayLike,
     ) -> FloatArray:
-        """Window errors for any times, whole frames or between them.
+        """Mismatches (window errors) at any times, whole frames or between them.
 
         Args:
             positions: (frames, bodies, 3), as for `align`.
             quaternions: (frames, bodies, 4).
             reaction: Its name.
-            exit_frames: Frames after contact, 0 to the last that leaves a window.
+            exit_frames: Frames after contact, 0 to the last that a whole window follows.
             entry_frames: Frames of the reaction within its entry range; broadcast against the
                 exits.
 
         Returns:
-            Errors [m], of the shape that both have together.
+            Mismatches [m], in the shape to which exits and entries are broadcast.
 
         Raises:
             UnknownNameError: There is no reaction of that name.
-            MotionError: As `align`, or a frame lies out of bounds.
+            MotionError: As `align`, or a frame is out of range.
         """
         position, quaternion = self._trace(positions, quaternions, 3)
         exits, entries = np.broadcast_arrays(
             np.asarray(exit_frames, np.float64), np.asarray(entry_frames, np.float64)
         )
-        place = self._places[self.row(reaction)]
-        first, latest = int(place[2]), int(place[2] + place[3])
+        layout = self._layouts[self.row(reaction)]
+        first, latest = int(layout[2]), int(layout[2] + layout[3])
         last = len(position) - self.window.window_frames
         for what, frames, low, high in (
             ("exit", exits, 0, last),
@@ -222,18 +225,18 @@ class Aligner:
             if not np.all((frames >= low) & (frames <= high)):
                 raise MotionError(
                     f"{reaction!r}: {what} frames from {frames.min():g} to {frames.max():g} were "
-                    f"asked for; expected {low} to {high}."
+                    f"given; expected {low} to {high}"
                 )
-        found = self._errors(position, quaternion, place, exits.ravel(), entries.ravel())
+        found = self._errors(position, quaternion, layout, exits.ravel(), entries.ravel())
         return found.reshape(exits.shape)
 
     def snap(
         self, positions: npt.ArrayLike, quaternions: npt.ArrayLike, alignment: Alignment
     ) -> Alignment:
-        """Move an alignment to a whole exit frame, where a simulation can be left.
+        """Move an alignment to a whole exit frame.
 
-        Exit and entry are shifted together, to the frame before or after; the entry is then tried
-        up to a frame earlier and later, within its bounds, and what fits best is taken.
+        Exit and entry move together, to the frame before or after. Then entries up to a frame
+        earlier and later are tried, within the entry range, and the best is taken.
 
         Args:
             positions: (frames, bodies, 3), the trace that was aligned.
@@ -241,27 +244,27 @@ class Aligner:
             alignment: What `align` found.
 
         Returns:
-            The alignment there, with its error.
+            The alignment there, with its mismatch.
 
         Raises:
-            UnknownNameError: The alignment is of a reaction that is not here.
-            MotionError: As `align`, or the exit lies outside the trace.
+            UnknownNameError: This aligner has no such reaction.
+            MotionError: As `align`, or the exit is outside the trace.
         """
         position, quaternion = self._trace(positions, quaternions, 3)
-        place = self._places[self.row(alignment.reaction)]
-        _, _, earliest, room = place.tolist()
+        layout = self._layouts[self.row(alignment.reaction)]
+        _, _, earliest, room = layout.tolist()
         last = len(position) - self.window.window_frames
-        # Bounds are whole frames: with an exit, those on either side are within them.
+        # Bounds are whole frames, so the frames before and after an exit are within them, too.
         exits = sorted({math.floor(alignment.exit_frame), math.ceil(alignment.exit_frame)})
         if not 0 <= exits[0] <= exits[-1] <= last:
             raise MotionError(
-                f"the exit is at frame {alignment.exit_frame:g}, the trace has {len(position)} "
-                f"frames, so that it can be left at 0 to {last}. Give the trace that was aligned."
+                f"the exit is at frame {alignment.exit_frame:g}; in this trace of {len(position)} "
+                f"frames, expected an exit from 0 to {last}; give the trace that was aligned"
             )
-        ends = np.repeat(np.array(exits, float), len(_NEARBY))
+        ends = np.repeat(np.array(exits, float), len(_ENTRY_SHIFTS))
         shifted = alignment.entry_frame - alignment.exit_frame + ends
-        entries = np.clip(shifted + np.tile(_NEARBY, len(exits)), earliest, earliest + room)
-        errors = self._errors(position, quaternion, place, ends, entries)
+        entries = np.clip(shifted + np.tile(_ENTRY_SHIFTS, len(exits)), earliest, earliest + room)
+        errors = self._errors(position, quaternion, layout, ends, entries)
         best = int(errors.argmin())
         return dataclasses.replace(
             alignment,
@@ -271,12 +274,12 @@ class Aligner:
             evaluations=alignment.evaluations + len(ends),
         )
 
-    # -- laying out and checking ----------------------------------------------------------------
+    # -- memory layout and checks ---------------------------------------------------------------
 
     def _lay_out(
         self, track: ReactionTrack
     ) -> tuple[npt.NDArray[np.float32], int, int, int] | None:
-        """Clip, row length, first entry and room for later ones; None if the track is unfit."""
+        """Clip, row length, first entry and number of later ones; None if the track is invalid."""
         shape, frames = np.shape(track.positions), self.window.window_frames
         if len(shape) != 3 or shape[1] == 0 or shape[2] != 3:
             return None
@@ -290,13 +293,13 @@ class Aligner:
         part = slice(first, first + used)
         position = np.ascontiguousarray(track.positions[part], np.float64)
         quaternion = np.ascontiguousarray(track.quaternions[part], np.float64)
-        fit = _kernel().lay_out(position, quaternion, used, clip)
-        return (clip, row, first, last - 1 - first) if fit else None
+        valid = _kernel().lay_out(position, quaternion, used, clip)
+        return (clip, row, first, last - 1 - first) if valid else None
 
     def _trace(
         self, positions: npt.ArrayLike, quaternions: npt.ArrayLike, dims: int
     ) -> tuple[FloatArray, FloatArray]:
-        """Arrays as the kernels want them, of the right shape and long enough."""
+        """Positions and quaternions as the kernels need them, of checked shape and length."""
         position = np.ascontiguousarray(positions, np.float64)
         quaternion = np.ascontiguousarray(quaternions, np.float64)
         shape = position.shape
@@ -311,12 +314,12 @@ class Aligner:
     ) -> FloatArray:
         """Call the kernel."""
         found = np.empty((*rows.shape, _kernel().COLUMNS))
-        unfit = _kernel().align_kernel(
+        invalid = _kernel().align_kernel(
             position,
             quaternion,
             rows,
             self._clips,
-            self._places,
+            self._layouts,
             *self._weights,
             self.window.window_frames,
             self._exits,
@@ -324,15 +327,15 @@ class Aligner:
             *self._settings,
             found,
         )
-        if unfit >= 0:
-            self._refuse(position[unfit : unfit + 1], quaternion[unfit : unfit + 1])
+        if invalid >= 0:
+            self._refuse(position[invalid : invalid + 1], quaternion[invalid : invalid + 1])
         return found
 
     def _errors(
         self,
         position: FloatArray,
         quaternion: FloatArray,
-        place: npt.NDArray[np.int64],
+        layout: npt.NDArray[np.int64],
         exits: FloatArray,
         entries: FloatArray,
     ) -> FloatArray:
@@ -340,7 +343,7 @@ class Aligner:
         found = np.empty(len(exits))
         frames = self.window.window_frames
         if len(exits) and not _kernel().errors_kernel(
-            position, quaternion, self._clips, place, *self._weights, frames, exits, entries, found
+            position, quaternion, self._clips, layout, *self._weights, frames, exits, entries, found
         ):
             self._refuse(position[None], quaternion[None])
         return found
@@ -351,15 +354,15 @@ class Aligner:
         make_many_windows(position, quaternion, [first], self.window, name=_TRACE)
         if position.shape[2] != self._bodies:
             raise MotionError(
-                f"the trace has {position.shape[2]} bodies, the reactions {self._bodies}. "
-                "Both must be of one character."
+                f"the trace has {position.shape[2]} bodies, the reactions {self._bodies}; "
+                "both must be of one character"
             )
-        raise MotionError(f"{_TRACE}: a quaternion is not of unit length, w x y z.")
+        raise MotionError(f"{_TRACE}: a quaternion is not of unit length, w x y z")
 
 
 @functools.cache
 def _kernel() -> ModuleType:
-    """The compiled part, loaded when it is needed: numba alone takes a third of a second."""
+    """The compiled part, loaded when it is needed: importing numba takes a third of a second."""
     from dynresp.response.alignment import alignment_kernel
 
     return alignment_kernel

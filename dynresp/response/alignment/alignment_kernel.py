@@ -1,15 +1,17 @@
-"""The compiled part of the time alignment: window errors between frames, sampling and descent.
+"""The compiled part of the time alignment: mismatches between frames, sampling and descent.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. The error of a pair of windows is that of `window_kernel`. Here a window may begin between
-two frames: positions are interpolated along straight lines, quaternions along the chord, the
-shorter way round, and brought back to unit length.
+The first call of a kernel compiles it (some seconds) or loads it from numba's cache. Importing this
+module imports numba (a third of a second); so import it where it is used.
 
-A track is laid out as seven rows of float32, x y z w i j k, each with the bodies of one frame
-behind those of the frame before. A window is then one stretch of every row wherever it begins, and
-the neighbour frames are the same stretch one frame further on. The loop over that stretch is the
-only hot one. It writes nothing but sums, so that it becomes vector instructions without a look at
-which arrays overlap; the slopes along both times come out of the same pass.
+The mismatch of two windows is that of `window_kernel`. Here a window may begin between two frames:
+positions are interpolated along straight lines, quaternions along the shorter chord, and brought
+back to unit length.
+
+A track is stored as seven rows of float32, x y z w i j k; each has the bodies of the first frame,
+then those of the next, and so on. A window is then one range of every row, wherever it begins, and
+the next frames are the same range, shifted by the number of bodies. Nearly all time goes into the
+loop over that range. It writes only sums, so that the compiler makes vector instructions without a
+check of which arrays overlap. The same pass gives the slopes along both times.
 """
 
 from __future__ import annotations
@@ -34,26 +36,26 @@ _Q4 = np.float32(0.00075941515)
 _R2, _R3, _R4 = np.float32(2.0) * _Q2, np.float32(3.0) * _Q3, np.float32(4.0) * _Q4
 
 _ZERO, _HALF, _ONE, _TWO = (np.float32(v) for v in (0.0, 0.5, 1.0, 2.0))
-# A difference smaller than this [m, or chord] has no direction worth a slope; and a pelvis whose
-# (w, k) is shorter is upside down, has no facing and is not turned.
+# A difference smaller than this [m, or chord] has no direction, and no slope; a pelvis whose (w, k)
+# is shorter than this is upside down, has no facing and is not turned.
 _TINY = np.float32(1e-6)
 
-# The share of the descent promised by the slope that a step must bring (Armijo's rule), and how
-# often a step that does not is shortened.
+# A step must lower the mismatch by this share of what the slope predicts (Armijo's rule); one that
+# does not is shortened, at most this often.
 _ARMIJO = 1e-4
-_SHORTER = 6
+_MOST_CUTS = 6
 
 _UNIT_TOLERANCE = 1e-3
 
 ROWS = 7
 ERROR, EXIT, ENTRY, EVALUATIONS, SETS, COMPLETE, REFINED, COLUMNS = range(8)
-"""Columns of what `align_kernel` tells of an alignment, and how many there are."""
+"""Columns of the results of `align_kernel`, and how many there are."""
 
 _TRACK = types.Array(types.float64, 3, "C", readonly=True)
 _TRACKS = types.Array(types.float64, 4, "C", readonly=True)
 _FLOATS = types.Array(types.float32, 1, "C", readonly=True)
 _REALS = types.Array(types.float64, 1, "C", readonly=True)
-_PLACE = types.Array(types.int64, 1, "C", readonly=True)
+_LAYOUT = types.Array(types.int64, 1, "C", readonly=True)
 _INTS = types.Array(types.int64, 2, "C", readonly=True)
 _INT, _REAL, _OUT = types.int64, types.float64, types.float64[::1]
 _OUTS = types.float64[:, :, ::1]
@@ -61,14 +63,14 @@ _OUTS = types.float64[:, :, ::1]
 _LAY_OUT = types.boolean(_TRACK, _TRACK, _INT, types.float32[::1])
 _ALIGN = _INT(_TRACKS, _TRACKS, _INTS, _FLOATS, _INTS, _FLOATS, _FLOATS, _INT, _REALS, _REAL, _INT,
               _INT, _INT, _REAL, _OUTS)
-_ERRORS = types.boolean(_TRACK, _TRACK, _FLOATS, _PLACE, _FLOATS, _FLOATS, _INT, _REALS, _REALS,
+_ERRORS = types.boolean(_TRACK, _TRACK, _FLOATS, _LAYOUT, _FLOATS, _FLOATS, _INT, _REALS, _REALS,
                         _OUT)
 # fmt: on
 
-# A look for division by zero would keep a loop from becoming vector instructions.
+# A check for division by zero would keep a loop from becoming vector instructions.
 _PLAIN: dict[str, Any] = {"error_model": "numpy"}
-# Sums may be spread over the lanes of a vector: other bits on another processor, but the same on
-# every call. Input is free of NaN (`lay_out`).
+# Sums may be spread over the lanes of a vector: another processor may give other bits, but every
+# call on one gives the same. The input has no NaN (`lay_out` checks it).
 _FAST: dict[str, Any] = {**_PLAIN, "fastmath": {"contract", "nnan", "nsz", "reassoc"}}
 
 
@@ -91,10 +93,10 @@ def _heading(track, row, at, share, bodies):
 
 @helper(forceinline=True, **_FAST)
 def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp, wt):
-    """Error of two windows [m] and its slopes along the first frame of either [m/frame].
+    """Mismatch of two windows [m] and its slopes along the first frame of either [m/frame].
 
     The window of track `a` begins `a_share`, 0 to 1, after its frame `a_frame`; that of `b`
-    likewise. The second is moved onto the first, instead of both to the origin: the same error.
+    likewise. The second is moved onto the first, not both to the origin; the mismatch is the same.
     """
     f, g = np.float32(a_share), np.float32(b_share)
     i, j = a_frame * bodies, b_frame * bodies
@@ -103,7 +105,7 @@ def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp,
     # The turn that brings the second window onto the first: its half angle, then its whole.
     c, s = ac * bc + as_ * bs, as_ * bc - ac * bs
     cc, ss = c * c - s * s, _TWO * c * s
-    # Unsigned, so that no index needs a look at its sign.
+    # Unsigned, so that no index needs a check of its sign.
     n, step = np.uint64(len(wp)), np.uint64(bodies)
     ax, ay, az = a[i:], a[a_row + i :], a[2 * a_row + i :]
     aw, ai = a[3 * a_row + i :], a[4 * a_row + i :]
@@ -146,7 +148,7 @@ def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp,
         chord = math.sqrt(u)
         q = _Q0 + u * (_Q1 + u * (_Q2 + u * (_Q3 + u * _Q4)))
         total += wp[e] * distance + wt[e] * (chord * q)
-        # d(chord Q) / du, times what u changes by; the turn itself turns with either facing.
+        # d(chord Q) / du, times the change of u; the turn itself changes with either facing.
         rise = (_HALF * q + u * (_Q1 + u * (_R2 + u * (_R3 + u * _R4)))) / max(chord, _TINY)
         rise = sign * wt[e] * rise
         swing = qk * rw - qw * rk + qj * ri - qi * rj
@@ -161,7 +163,7 @@ def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp,
 
 @helper(**_FAST)
 def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):
-    """Error alone; what the slopes cost falls away when this is compiled."""
+    """Mismatch alone; the compiler drops what only the slopes need."""
     s, m = int(exit_at), int(entry_at)
     found = _measure(a, a_row, s, exit_at - s, b, b_row, m, entry_at - m, bodies, wp, wt)
     return found[0]
@@ -169,7 +171,7 @@ def _error(a, a_row, exit_at, b, b_row, entry_at, bodies, wp, wt):
 
 @helper(**_FAST)
 def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):
-    """Error and slopes; at the upper ends of the box, the slopes from below."""
+    """Mismatch and slopes; at the upper bounds, the slopes from below."""
     s, m = int(exit_at), int(entry_at)
     if exit_at >= last and s == exit_at and s > 0:
         s -= 1
@@ -180,18 +182,18 @@ def _slope(a, a_row, exit_at, last, b, b_row, entry_at, latest, bodies, wp, wt):
 
 @compiled(_LAY_OUT, **_PLAIN)
 def lay_out(positions, quaternions, frames, rows):
-    """Lay out a track; one more frame, a copy of the last, and finite padding follow.
+    """Store a track in rows; one more frame, a copy of the last, and finite padding follow.
 
     Args:
         positions: (frames or more, bodies, 3) [m], float64.
         quaternions: (frames or more, bodies, 4), w x y z.
         frames: How many of them to take.
         rows: Out, (7 * row length,) float32. The ground point of the first frame's pelvis is
-            taken off all positions, in double precision; signs of quaternions are chosen so that
-            neighbour frames lie in one hemisphere.
+            subtracted from all positions, in double precision; signs of quaternions are chosen
+            so that neighbour frames are in one hemisphere.
 
     Returns:
-        Whether all was finite and of unit length.
+        Whether all numbers are finite and all quaternions of unit length.
     """
     bodies = positions.shape[1]
     row = len(rows) // ROWS
@@ -223,21 +225,21 @@ def lay_out(positions, quaternions, frames, rows):
 
 
 @helper(**_PLAIN)
-def _free(at, low, high, slope):
-    """Whether going down the slope stays between the bounds."""
+def _can_descend(at, low, high, slope):
+    """Whether a step down the slope stays between the bounds."""
     return not ((at <= low and slope >= 0.0) or (at >= high and slope <= 0.0))
 
 
 @helper(**_PLAIN)
 def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step, most, gain):
-    """BFGS from a sample, projected on the box: error, exit, entry and evaluations."""
+    """BFGS from a sample, kept within the bounds: mismatch, exit, entry and evaluations."""
     f, gs, gm = _slope(a, a_row, s, last, b, b_row, m, latest, bodies, wp, wt)
     evaluations = 1
-    # As if the bottom lay half a sample away, until a step has told the curvature.
+    # As if the minimum were half a sample away, until a step shows the curvature.
     hss = max(math.sqrt(gs * gs + gm * gm) / (0.5 * step), 1e-12)
-    hmm, hsm, told = hss, 0.0, False
+    hmm, hsm, curvature_known = hss, 0.0, False
     for _ in range(most):
-        s_free, m_free = _free(s, first, last, gs), _free(m, 0.0, latest, gm)
+        s_free, m_free = _can_descend(s, first, last, gs), _can_descend(m, 0.0, latest, gm)
         if not (s_free or m_free):
             break
         ds = -gs / hss if s_free else 0.0
@@ -245,12 +247,12 @@ def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step
         if s_free and m_free:
             det = hss * hmm - hsm * hsm
             ns, nm = (hsm * gm - hmm * gs) / det, (hsm * gs - hss * gm) / det
-            # Where a bound cuts it short, the whole step may lead up.
+            # Where a bound shortens it, the step may lead up.
             ts, tm = min(max(s + ns, first), last) - s, min(max(m + nm, 0.0), latest) - m
             if gs * ts + gm * tm < 0.0:
                 ds, dm = ns, nm
         size, accepted = 1.0, False
-        for _ in range(_SHORTER):
+        for _ in range(_MOST_CUTS):
             s1 = min(max(s + size * ds, first), last)
             m1 = min(max(m + size * dm, 0.0), latest)
             promised = gs * (s1 - s) + gm * (m1 - m)
@@ -268,9 +270,9 @@ def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step
         xs, xm, ys, ym = s1 - s, m1 - m, gs1 - gs, gm1 - gm
         bend, length = xs * ys + xm * ym, xs * xs + xm * xm
         if bend > 1e-9 * length:
-            if not told:
+            if not curvature_known:
                 hss = hmm = (ys * ys + ym * ym) / bend
-                told = True
+                curvature_known = True
             bs, bm = hss * xs + hsm * xm, hsm * xs + hmm * xm
             stiff = xs * bs + xm * bm
             hss += ys * ys / bend - bs * bs / stiff
@@ -285,7 +287,7 @@ def _descend(a, a_row, first, last, b, b_row, latest, bodies, wp, wt, s, m, step
 
 @helper(**_PLAIN)
 def _lowest(errors, sets, entries):
-    """The lowest error of the first sets, infinity where all are, and where it is."""
+    """The lowest mismatch of the first sets (infinity if all are), its set and its entry."""
     lowest, s, e = np.float32(np.inf), 0, 0
     for i in range(sets):
         for j in range(entries):
@@ -296,29 +298,30 @@ def _lowest(errors, sets, entries):
 
 @compiled(_ALIGN, **_PLAIN)
 def align_kernel(
-    positions, quaternions, rows, clips, places, wp, wt, frames, exits, step, patience, starts,
+    positions, quaternions, rows, clips, layouts, wp, wt, frames, exits, step, patience, starts,
     most, gain, found,
 ):  # fmt: skip
-    """Align reactions with traces: samples in sets by exit, then descent from the best of them.
+    """Align reactions with traces: sample in sets, one for each exit; descend from the best.
 
     Args:
         positions: (traces, frames, bodies, 3) [m], float64; frame 0 is the first contact, body 0
             the pelvis.
         quaternions: (traces, frames, bodies, 4), w x y z.
         rows: (traces, k) reactions to align with each trace.
-        clips: Laid-out clips of all reactions, one behind the other.
-        places: (reactions, 4): where a reaction's clip begins in `clips`, its row length, the
-            frame of the reaction with which it begins, and how many frames later the latest entry
-            is; the earliest is that first frame.
+        clips: Clips of all reactions as `lay_out` stores them, one after the other.
+        layouts: (reactions, 4): index in `clips` at which a reaction's clip begins, its row length,
+            the frame of the reaction with which it begins, which is the first entry, and how many
+            frames later the last entry is.
         wp: Weight of a metre for each body of each frame of a window, padded with zeros.
         wt: Weight of a radian likewise.
         frames: Frames in a window.
-        exits: (sets,) exits to sample, rising [frames]; a window after the first must be there.
-        step: Largest distance of the entries to sample [frames].
-        patience: Sets without gain after which sampling is cut.
+        exits: (sets,) exits to sample, ascending [frames]; the trace must have a window after the
+            first.
+        step: Largest step of the entries to sample [frames].
+        patience: Sampling ends after so many sets without a better sample.
         starts: Samples to descend from.
         most: Steps of a descent, 0 for none.
-        gain: A descent ends where a step brings no more than this share of the error.
+        gain: A descent ends where a step lowers the mismatch by no more than this share of it.
         found: Out, (traces, k, `COLUMNS`).
 
     Returns:
@@ -335,55 +338,57 @@ def align_kernel(
         if not lay_out(positions[n], quaternions[n], used, a):
             return n
         for r in range(rows.shape[1]):
-            place = places[rows[n, r]]
-            b_row, latest = place[1], float(place[3])
-            b = clips[place[0] : place[0] + ROWS * b_row]
+            layout = layouts[rows[n, r]]
+            b_row, latest = layout[1], float(layout[3])
+            b = clips[layout[0] : layout[0] + ROWS * b_row]
             entries = math.ceil(latest / step - 1e-9) + 1
             errors = np.empty((sets, entries), np.float32)
-            apart = latest / max(entries - 1, 1)
-            best, without, tried = np.float32(np.inf), 0, 0
-            while tried < sets and without < patience:
-                without += 1
+            entry_step = latest / max(entries - 1, 1)
+            best, idle_sets, sampled = np.float32(np.inf), 0, 0
+            while sampled < sets and idle_sets < patience:
+                idle_sets += 1
                 for e in range(entries):
-                    error = _error(a, a_row, exits[tried], b, b_row, e * apart, bodies, wp, wt)
-                    errors[tried, e] = error
+                    error = _error(
+                        a, a_row, exits[sampled], b, b_row, e * entry_step, bodies, wp, wt
+                    )
+                    errors[sampled, e] = error
                     if error < best:
-                        best, without = error, 0
-                tried += 1
+                        best, idle_sets = error, 0
+                sampled += 1
             out = found[n, r]
             out[ERROR] = np.inf
-            out[EVALUATIONS] = tried * entries
-            out[SETS] = tried
-            out[COMPLETE] = tried == len(exits) or without >= patience
+            out[EVALUATIONS] = sampled * entries
+            out[SETS] = sampled
+            out[COMPLETE] = sampled == len(exits) or idle_sets >= patience
             for _ in range(starts):
-                lowest, s, e = _lowest(errors, tried, entries)
+                lowest, s, e = _lowest(errors, sampled, entries)
                 if lowest == np.inf:
                     break
-                # Its neighbours belong to the same valley.
+                # Its neighbours lead to the same minimum.
                 for i in range(max(s - 1, 0), min(s + 2, sets)):
                     for j in range(max(e - 1, 0), min(e + 2, entries)):
                         errors[i, j] = np.inf
                 if lowest < out[ERROR]:
                     out[REFINED] = 0.0
-                    out[ERROR], out[EXIT], out[ENTRY] = lowest, exits[s], e * apart + place[2]
+                    out[ERROR], out[EXIT], out[ENTRY] = lowest, exits[s], e * entry_step + layout[2]
                 if most > 0:
                     error, at, entry, cost = _descend(
-                        a, a_row, exits[0], exits[tried - 1], b, b_row, latest, bodies, wp, wt,
-                        exits[s], e * apart, step, most, gain,
+                        a, a_row, exits[0], exits[sampled - 1], b, b_row, latest, bodies, wp, wt,
+                        exits[s], e * entry_step, step, most, gain,
                     )  # fmt: skip
                     out[EVALUATIONS] += cost
                     if error < out[ERROR]:
                         out[REFINED] = 1.0
-                        out[ERROR], out[EXIT], out[ENTRY] = error, at, entry + place[2]
+                        out[ERROR], out[EXIT], out[ENTRY] = error, at, entry + layout[2]
     return -1
 
 
 @compiled(_ERRORS, **_PLAIN)
-def errors_kernel(positions, quaternions, clips, place, wp, wt, frames, exits, entries, errors):
-    """Errors (pairs,) of windows that begin anywhere between frames, in `errors` [m].
+def errors_kernel(positions, quaternions, clips, layout, wp, wt, frames, exits, entries, errors):
+    """Write mismatches of windows that begin anywhere between frames to `errors` (pairs,) [m].
 
-    `place` is the reaction's row of `places`; all else is as for `align_kernel`, with one trace.
-    False if the trace is not finite or not of unit length as far as it is needed.
+    `layout` is the reaction's row of `layouts`; all else is as for `align_kernel`, with one trace.
+    Returns False if what is needed of the trace is not finite or not of unit length.
     """
     bodies = positions.shape[1]
     latest = 0.0
@@ -394,8 +399,8 @@ def errors_kernel(positions, quaternions, clips, place, wp, wt, frames, exits, e
     a = np.empty(ROWS * a_row, np.float32)
     if not lay_out(positions, quaternions, used, a):
         return False
-    b_row = place[1]
-    b = clips[place[0] : place[0] + ROWS * b_row]
+    b_row = layout[1]
+    b = clips[layout[0] : layout[0] + ROWS * b_row]
     for p in range(len(exits)):
-        errors[p] = _error(a, a_row, exits[p], b, b_row, entries[p] - place[2], bodies, wp, wt)
+        errors[p] = _error(a, a_row, exits[p], b, b_row, entries[p] - layout[2], bodies, wp, wt)
     return True

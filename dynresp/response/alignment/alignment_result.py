@@ -1,33 +1,35 @@
-"""What a time alignment is, and the settings by which it is made."""
+"""The result of a time alignment (exit and entry), and its settings."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.errors import UsageError
+from dynresp.support.checks import check_number
+
+LEAST_GAIN = 1e-4
+"""A descent ends where a step lowers the mismatch by no more than this share of it."""
 
 
 @dataclass(frozen=True)
 class AlignmentConfig:
-    """Quality against speed.
+    """Settings that weigh quality against speed.
 
     Attributes:
-        step_s: Largest distance of the samples along both times [s]; both ends of a range are
-            always sampled. The paper's ten frames at 120 a second.
-        sets_without_gain: Sampling is cut after this many sets, each with all entries of one exit,
-            that hold no better sample than those before. Fewer are faster and need less of the
+        step_s: Largest step of the samples along both times [s]; both ends of a range are always
+            sampled. The paper's ten frames at 120 a second.
+        sets_without_gain: Sampling ends after this many sets, each with all entries of one exit,
+            that have no better sample than the sets before. Fewer are faster and need less of the
             simulation; as many as there are exits sample all. With two, the choices of a classifier
-            had twice the regret of those with three (1,000 hits, most of them the right reaction
-            at a moment up to 40 % worse); the third costs two microseconds.
-        starts: From how many samples, none beside another, the descent begins; its best is taken.
-        refine: Whether to descend at all; without it the best sample is taken.
+            had twice the regret of those with three (1,000 hits; most had the right reaction with
+            a mismatch up to 40 % larger); the third costs two microseconds.
+        starts: Number of samples, no two of them neighbours, from which a descent begins; the best
+            result counts.
+        refine: Whether to descend at all; if not, the best sample is the result.
         most_iterations: Steps of a descent, at most.
-        least_gain: A descent ends where a step brings no more than this share of the error.
     """
 
     step_s: float = 1.0 / 12.0
@@ -35,7 +37,6 @@ class AlignmentConfig:
     starts: int = 1
     refine: bool = True
     most_iterations: int = 20
-    least_gain: float = 1e-4
 
     def __post_init__(self) -> None:
         """Check every value.
@@ -43,29 +44,24 @@ class AlignmentConfig:
         Raises:
             UsageError: A value is out of range; the message names it.
         """
-        if not 0.0 < self.step_s < math.inf:
-            raise UsageError(f"step_s is {self.step_s}; expected a finite number above 0.")
+        check_number("step_s", self.step_s, 0.0, unit="s", above_low=True)
         for name in ("sets_without_gain", "starts", "most_iterations"):
-            if getattr(self, name) < 1:
-                raise UsageError(f"{name} is {getattr(self, name)}; expected at least 1.")
-        if not 0.0 <= self.least_gain < 1.0:
-            raise UsageError(f"least_gain is {self.least_gain}; expected 0 or more, below 1.")
+            check_number(name, getattr(self, name), 1, whole=True)
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where one reaction fits a simulated trace.
+    """Exit and entry where one reaction fits a simulated trace best.
 
     Attributes:
         reaction: Name of the reaction.
-        error: Window error [m].
-        exit_frame: When to leave the simulation, in frames after contact; between frames, as a
-            rule.
-        entry_frame: Where to enter the reaction, in frames of its clip; likewise.
-        evaluations: Window errors computed.
+        error: Mismatch (window error) [m].
+        exit_frame: Exit, in frames after contact; usually between two frames.
+        entry_frame: Entry, in frames of the reaction's clip; usually between two frames.
+        evaluations: Mismatches computed.
         sets: Sets sampled.
-        complete: Whether the search ended by itself. False where it ended with the trace: then a
-            longer trace may fit better.
+        complete: Whether sampling ended by itself. False where it ended because the trace did; a
+            longer trace may then fit better.
         refined: Whether a descent improved on the best sample.
     """
 
@@ -86,12 +82,12 @@ class Alignments:
     Attributes:
         names: Names of all reactions.
         rows: Which reactions were aligned, as indices into `names`.
-        errors: Window errors [m].
+        errors: Mismatches (window errors) [m].
         exit_frames: Frames after contact.
         entry_frames: Frames of the reactions' clips.
-        evaluations: Window errors computed.
+        evaluations: Mismatches computed.
         sets: Sets sampled.
-        complete: Whether the search ended by itself.
+        complete: Whether sampling ended by itself.
         refined: Whether a descent improved on the best sample.
     """
 

@@ -159,7 +159,7 @@ def _run(
     npt.NDArray[np.float32],
 ]:
     """Call the kernel: least mismatches, their exit and entry indices, and its scratch."""
-    # numba takes a third of a second to import, the kernel one more when it is first compiled.
+    # Importing numba takes a third of a second.
     from dynresp.response.windows.window_kernel import search_kernel
 
     config = library.config

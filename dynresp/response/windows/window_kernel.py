@@ -1,12 +1,14 @@
 """The compiled inner loop of the window search.
 
-Importing this module compiles it (one to two seconds) or loads it from numba's cache; import it
-where it is used. The error of a pair of windows is (Zordan et al. 2007, section 5)
+The first call compiles it (one to two seconds) or loads it from numba's cache. Importing this
+module imports numba (a third of a second); so import it where it is used.
+
+The mismatch (window error) of a pair is (Zordan et al. 2007, section 5)
 
     E = sum_i w_i sum_b ( wp_b |p_b - p'_b| + wt_b angle(q_b, q'_b) ),   sum_i w_i = 1,
 
 summed frame by frame and body by body in float32. The innermost loop runs over the entry windows,
-which lie side by side in memory and become the lanes of vector instructions; no sum runs across
+which are neighbours in memory and become the lanes of vector instructions; no sum runs across
 lanes, so the order of additions, and with it every bit of the result, is fixed.
 
 The angle is taken from the chord c = |q - q'| of the nearer of q' and -q', angle = 4 asin(c / 2).
@@ -23,16 +25,16 @@ from numba import types
 
 from dynresp.support.compiling import compiled, helper
 
-# Q(u) = 4 asin(sqrt(u) / 2) / sqrt(u) on 0 <= u <= 2 (rotations up to 180 degrees): weighted least
-# squares driven to the smallest largest relative error, 5.8e-6. Two more terms would bring 1.8e-7
-# and cost an eighth more time.
+# Q(u) = 4 asin(sqrt(u) / 2) / sqrt(u) on 0 <= u <= 2 (rotations up to 180 degrees), fitted by
+# weighted least squares for the smallest largest relative error, 5.8e-6. Two more terms would give
+# 1.8e-7 and cost an eighth more time.
 _Q0 = np.float32(2.0000112)
 _Q1 = np.float32(0.08307144)
 _Q2 = np.float32(0.010329804)
 _Q3 = np.float32(0.00022560566)
 _Q4 = np.float32(0.00075941515)
 
-# A pair drops others only when they exceed it by more than rounding could explain.
+# A pair excludes others only if they exceed it by more than rounding can explain.
 _SLACK = np.float32(1.0001)
 _FLOOR = np.float32(1e-5)
 _ZERO = np.float32(0.0)
@@ -56,7 +58,7 @@ _SIGNATURE = types.void(
     types.int64[::1],
     types.float32[:, ::1],
 )
-# No reassociation, so that the order of additions stands; input is free of NaN (`make_windows`).
+# No reassociation: the order of additions is fixed. The input has no NaN (`make_windows` checks).
 _FASTMATH = {"contract", "nnan", "nsz"}
 
 
@@ -91,25 +93,25 @@ def search_kernel(
 ):
     """Find the best pair of windows of every reaction.
 
-    With `early_stop`, entries at both ends of an exit's row are dropped as soon as the error
-    summed so far exceeds the whole error of some other pair. Terms are never negative, so what is
-    dropped could not have won, and what is kept is summed as it would have been: same result.
+    With `early_stop`, entries at both ends of an exit's row are skipped as soon as their sum so far
+    exceeds the whole mismatch of another pair. Terms are never negative, so what is skipped could
+    not have won, and what is kept is summed as always: the result is the same.
 
     Args:
         trace: (frames, bodies, 7, exits padded) float32.
         exits: Number of exits without padding.
         buffer: Windows of the reactions, each (frames, bodies, 7, entries padded), flat float32.
-        offsets: (reactions,) where each reaction begins in `buffer`.
+        offsets: (reactions,) index in `buffer` at which each reaction begins.
         counts: (reactions,) entries of each reaction without padding.
         position_weights: (frames, bodies), w_i wp_b.
         angle_weights: (frames, bodies), w_i wt_b.
         lanes: Windows are padded to a multiple of this; rows are cut at multiples of it.
-        early_stop: Whether to drop pairs that cannot win.
-        best_errors: Out, (reactions,).
-        best_exits: Out, (reactions,) index of the exit; of equal errors the lowest exit, then the
-            lowest entry.
+        early_stop: Whether to skip pairs that cannot win.
+        best_errors: Out, (reactions,) [m].
+        best_exits: Out, (reactions,) index of the exit; of equal mismatches the lowest exit, then
+            the lowest entry.
         best_entries: Out, (reactions,) index of the entry.
-        errors: Scratch, (exits, largest padded count); holds all errors of the last reaction
+        errors: Scratch, (exits, largest padded count); has all mismatches of the last reaction
             afterwards if `early_stop` is off.
     """
     frames, bodies = trace.shape[0], trace.shape[1]
@@ -146,7 +148,7 @@ def search_kernel(
                         )  # fmt: skip
             if not early_stop or f == frames - 1:
                 continue
-            # The whole error of the pair that leads so far bounds the error of the winner.
+            # The whole mismatch of the pair that leads so far bounds that of the winner.
             lead, lead_exit, lead_entry = np.float32(np.inf), 0, 0
             for s in range(exits):
                 for m in range(low[s], min(high[s], count)):

@@ -103,7 +103,7 @@ def test_slopes_are_those_of_the_twin(seed: int) -> None:
     row = (FRAMES + 1) * BODIES + kernel.LANES
     rows = np.empty(kernel.ROWS * row, np.float32)
     assert kernel.lay_out(*trace, FRAMES, rows)
-    _, clip_row, _, latest = aligner._places[0].tolist()
+    _, clip_row, _, latest = aligner._layouts[0].tolist()
     rng = np.random.default_rng(seed)
     slope = njit(lambda *arguments: kernel._slope(*arguments))
     for _ in range(4):

@@ -115,7 +115,7 @@ def test_snapping_takes_the_better_frame_and_holds_the_entry_in_its_bounds() -> 
     bounded = Aligner([dataclasses.replace(track, entry_range=(7, 12))], WINDOW)
     edge = Alignment("itself", 1.0, 6.9, 7.0, 0, 1, True, True)
     assert bounded.snap(*trace, edge).entry_frame >= 7.0
-    with pytest.raises(MotionError, match=r"exit is at frame 6.9.* left at 0 to 3"):
+    with pytest.raises(MotionError, match=r"exit is at frame 6.9.* from 0 to 3"):
         aligner.snap(trace[0][:8], trace[1][:8], edge)
 
 
@@ -264,8 +264,6 @@ def test_libraries_that_make_no_sense_are_refused() -> None:
         ("sets_without_gain", 0),
         ("starts", 0),
         ("most_iterations", 0),
-        ("least_gain", -0.1),
-        ("least_gain", 1.0),
     ],
 )
 def test_settings_out_of_range_are_named(field: str, value: float) -> None:
