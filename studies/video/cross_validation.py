@@ -20,8 +20,8 @@ from dynresp.locomotion.vision.person_tracker import PictureFeatures, track_pers
 from dynresp.locomotion.vision.silhouette_features import FeatureConfig
 from dynresp.locomotion.vision.silhouette_table import (
     ViewTable,
-    joined,
-    sampled,
+    full_projection,
+    sample_slice,
     shape_basis,
     table_identity,
 )
@@ -153,10 +153,10 @@ def part_of_table(
     """
     back = np.linalg.inv(whole.projection)
     rows = whole.rows[kept]
-    shapes = rows[sampled(len(kept))].reshape(-1, rows.shape[2]) @ back + whole.mean
+    shapes = rows[sample_slice(len(kept))].reshape(-1, rows.shape[2]) @ back + whole.mean
     shape_mean, basis = shape_basis(shapes[:, :-3], config)
     motion = rows[..., -3:].astype(np.float64) * np.diag(back)[-3:] + whole.mean[-3:]
-    mean, projection = joined(shape_mean, basis, motion, config)
+    mean, projection = full_projection(shape_mean, basis, motion, config)
     leads = (back @ projection).astype(np.float32)
     offset = ((whole.mean - mean) @ projection).astype(np.float32)
 

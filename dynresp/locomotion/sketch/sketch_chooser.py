@@ -1,12 +1,12 @@
-"""The action that follows a sketch best: the paper's first way (Lee et al. 2002, section 5.2).
+"""Choose the action that follows a sketch best: the paper's method (Lee et al. 2002, section 5.2).
 
-An action is a cluster path of the tree at the current frame. Its most probable motion (eq. 7),
-which then stays in the last cluster by the most probable ways, tells a path over the ground, that
-of the centre of mass. The action whose path is nearest to the sketch, by dynamic time warping, is
-taken.
+An action is a cluster path of the tree at the current frame. Its motion is the most probable one
+(eq. 7), which then stays in the last cluster along the most probable jumps. The centre of mass of
+that motion goes along a path over the ground. The action whose path is nearest to the sketch, by
+dynamic time warping, is chosen.
 
-It suits worlds that have been clustered, where there is room for a few actions, such as the step
-stool. For long paths and obstacles take `dynresp.locomotion.sketch.sketch_control`.
+This suits worlds whose motion is clustered and that have room for only a few actions, such as the
+step stool. For long paths and obstacles use `dynresp.locomotion.sketch.sketch_control`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
 from dynresp.support.errors import UsageError
 
-# Points of a sketch that are compared with a path are so far apart [m].
+# Distance between the points of a sketch that are compared with a path [m].
 _SPACING = 0.1
 
 
@@ -34,12 +34,12 @@ class SketchedAction:
     """An action that follows a sketch.
 
     Attributes:
-        frames: (s,) to play after the frame at which it was chosen.
+        frames: (s,) frames to play after the one at which it was chosen.
         path: (s, 2) the centre of mass over the ground [m].
         clusters: (p,) its cluster path.
-        cost: Sum of distances between matched points of the sketch and of the path, the least of
-            all actions [m].
-        actions: How many there were to choose from.
+        cost: Sum of distances between matched points of the sketch and of the path [m]; the least
+            of all actions.
+        actions: Number of actions to choose from.
     """
 
     frames: IntArray
@@ -53,9 +53,9 @@ class SketchChooser:
     """Chooses actions by sketch.
 
     Attributes:
-        forest: The actions.
-        ahead_s: How long they may take [s].
-        ahead_m: How much of a sketch is looked at [m].
+        forest: The cluster trees, which hold the actions.
+        ahead_s: Longest time of an action [s].
+        ahead_m: Length of the sketch's beginning that is compared [m].
     """
 
     def __init__(
@@ -65,13 +65,13 @@ class SketchChooser:
         ahead_s: float = 4.0,
         ahead_m: float = 2.5,
     ) -> None:
-        """Prepare to choose.
+        """Compute the centre of mass of each frame.
 
         Args:
-            forest: The actions.
-            character: Whose they are, by default the product's own.
-            ahead_s: How long they may take [s].
-            ahead_m: How much of a sketch is looked at [m].
+            forest: The cluster trees, which hold the actions.
+            character: Whose motions they are, by default the product's own.
+            ahead_s: Longest time of an action [s].
+            ahead_m: Length of the sketch's beginning that is compared [m].
 
         Raises:
             UsageError: A length or time is not above 0.
@@ -82,23 +82,23 @@ class SketchChooser:
         self.ahead_s, self.ahead_m = ahead_s, ahead_m
         character = character or default_character()
         centers = character.kinematics(forest.graph.database.poses).centers
-        # As placements: it is moved as a root that does not turn.
+        # (n, 4) as placements: the centre moves like a root that does not turn.
         self._centers = np.zeros((len(centers), 4))
         self._centers[:, :3] = np.einsum("fbc,b->fc", centers, character.masses)
         self._centers[:, :3] /= character.masses.sum()
 
-    def choose(self, frame: int, place: npt.ArrayLike, sketch: npt.ArrayLike) -> SketchedAction:
+    def choose(self, frame: int, placed: npt.ArrayLike, sketch: npt.ArrayLike) -> SketchedAction:
         """The action that follows a sketch best.
 
         Args:
-            frame: The frame the avatar is at.
-            place: (4,) where its clip is put.
-            sketch: (k, 2) corners of a path on the ground, from where the avatar is on, at most
-                1 km long [m].
+            frame: The frame that the avatar is at.
+            placed: (4,) placement of its clip.
+            sketch: (k, 2) corners of a path on the ground that begins at the avatar, at most 1 km
+                long [m].
 
         Raises:
-            UsageError: The frame is not in the graph's component, the sketch is no path or too
-                long, or no action is so short.
+            UsageError: The frame is not in the graph's component, the sketch is not a path or is
+                too long, or no action ends within `ahead_s`.
         """
         forest, graph = self.forest, self.forest.graph
         corners = as_path(sketch, "a sketch")
@@ -108,7 +108,7 @@ class SketchChooser:
         left = forest.steps_within(self.ahead_s) - (len(lead) - 1)
         if left < 1:
             raise UsageError(
-                f"from frame {frame} on there is no choice within ahead_s, {self.ahead_s:g} s; "
+                f"from frame {frame} on there is no choice within ahead_s = {self.ahead_s:g} s; "
                 "look farther ahead"
             )
         left_s = left / graph.database.fps
@@ -118,11 +118,11 @@ class SketchChooser:
             motion = forest.likeliest_motion(tree, int(leaf), left_s)
             frames = np.concatenate([lead[:-1], forest.stay(motion.frames, left)])
             motions.append(frames[1:])
-            paths.append(self._path(frames, place)[1:])
+            paths.append(self._path(frames, placed)[1:])
         kept = [k for k, frames in enumerate(motions) if len(frames)]
         if not kept:
             raise UsageError(
-                f"from frame {frame} on there is no action within ahead_s, {self.ahead_s:g} s; "
+                f"from frame {frame} on there is no action within ahead_s = {self.ahead_s:g} s; "
                 "look farther ahead"
             )
         offsets = np.cumsum([0, *(len(paths[k]) for k in kept)], dtype=np.int64)
@@ -137,9 +137,9 @@ class SketchChooser:
             actions=len(kept),
         )
 
-    def _path(self, frames: IntArray, place: npt.ArrayLike) -> FloatArray:
-        """(s, 2) the centre of mass over the ground along frames."""
+    def _path(self, frames: IntArray, placed: npt.ArrayLike) -> FloatArray:
+        """(s, 2) the centre of mass over the ground while frames play [m]."""
         database = self.forest.graph.database
-        roots = self.forest.root_states_along(frames, place)
+        roots = self.forest.root_states_along(frames, placed)
         clips = placement.compose(roots, placement.inverse(database.planar[frames]))
         return placement.compose(clips, self._centers[frames])[:, :2]

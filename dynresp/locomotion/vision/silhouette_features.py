@@ -1,14 +1,14 @@
-"""What is measured of a silhouette: its shape, and where its centre is (Lee et al. 2002, 5.3).
+"""Features of a silhouette: its shape, and the motion of its centre (Lee et al. 2002, 5.3).
 
 The paper describes a shape by the seven Hu moments. They do not change when a shape is turned in
-the picture or, but for the sign of the seventh, mirrored, so that much of what tells a person's
-poses apart is lost. By default a shape is therefore told by a grid laid over it, as large as the
-silhouette is spread, so that like Hu's moments it depends neither on where a person is nor on how
-tall or how far away; what share of each cell is covered is then reduced to principal components.
+the picture; when it is mirrored, only the sign of the seventh does. So poses that differ may look
+alike to them. By default a shape is therefore described by a grid over the silhouette, whose size
+follows the silhouette's spread. Like Hu's moments it depends neither on where the person is nor on
+how tall or how far away. The covered share of each cell is then reduced to principal components.
 
-Of the centre its motion counts. Speeds are told in silhouette radii a second, the radius being the
-root mean square distance of a silhouette's points from its centre: about a quarter of the height
-of somebody standing.
+Of the centre only its motion counts. Its speed is measured in silhouette radii a second. The radius
+is the root mean square distance of a silhouette's points from its centre: about a quarter of the
+height of a standing person.
 """
 
 from __future__ import annotations
@@ -25,35 +25,37 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
 from dynresp.support.extras import require
 
-# The grid: rows and columns, and how far it reaches from the centre in radii.
+# The grid: rows and columns, and how far it reaches from the centre up and aside [radii].
 _GRID = (12, 8)
 _REACH = (2.4, 1.6)
-# Hu's moments are products of up to so many moments; their roots are all of one kind of size.
+# Each of Hu's moments is a sum of products of so many moments; these roots have similar sizes.
 _DEGREES = np.array([1.0, 2.0, 2.0, 2.0, 4.0, 3.0, 4.0])
 
 
 class Shape(Enum):
-    """How the shape of a silhouette is told."""
+    """How the shape of a silhouette is described."""
 
     GRID = "grid"
-    """Share of each cell of a grid that is covered."""
+    """The covered share of each cell of a grid."""
     HU = "hu"
     """The seven Hu moments, as in the paper."""
 
 
 @dataclass(frozen=True)
 class FeatureConfig:
-    """What is compared, and how much each part counts.
+    """Which features are compared, and their weights.
+
+    All of it is written to the file of silhouettes, and is part of its identity.
 
     Attributes:
-        shape: How shapes are told.
-        components: Principal components of the grid.
-        span_s: Speeds are means over so long [s], up to now.
-        distance_m: Distance of the camera for which the apparent growth of somebody who comes
-            nearer is foreseen [m].
-        shape_weight: Of the squared distance of shapes.
-        speed_weight: Of the squared differences of the centre's speeds to the right and up.
-        growth_weight: Of the squared difference of growth.
+        shape: How shapes are described.
+        components: Number of principal components of the grid.
+        span_s: Speeds are means over this time up to now [s].
+        distance_m: Assumed distance of the camera [m]; from it follows how fast a person who comes
+            nearer seems to grow.
+        shape_weight: Weight of the squared distance of shapes.
+        speed_weight: Weight of the squared differences of the centre's speeds, right and up.
+        growth_weight: Weight of the squared difference of growth.
     """
 
     shape: Shape = Shape.GRID
@@ -68,7 +70,7 @@ class FeatureConfig:
         """Check the numbers.
 
         Raises:
-            UsageError: One of them makes no sense.
+            UsageError: One of them is out of range.
         """
         if not 1 <= self.components <= _GRID[0] * _GRID[1]:
             raise UsageError(
@@ -84,13 +86,13 @@ class FeatureConfig:
 
 @dataclass(frozen=True)
 class Measures:
-    """One silhouette.
+    """What is measured of one silhouette.
 
     Attributes:
         shape: (96,) covered shares of the grid, row by row from the top left, or (7,) signed roots
             of Hu's moments.
-        right: Where the centre is in the picture, to the right [pixels].
-        up: The same upwards, counted from the upper edge, so below 0 [pixels].
+        right: The centre's distance from the picture's left edge [pixels].
+        up: The centre's height over the picture's upper edge, so below 0 [pixels].
         radius: Root mean square distance of the silhouette's points from the centre [pixels].
     """
 
@@ -104,11 +106,11 @@ def measure(mask: Mask, shape: Shape) -> Measures | None:
     """Measure a silhouette.
 
     Args:
-        mask: (height, width), not 0 inside.
-        shape: How to tell its shape.
+        mask: (height, width), not 0 inside the silhouette.
+        shape: How to describe its shape.
 
     Returns:
-        None where there is nothing inside.
+        What is measured; None if the mask is empty.
     """
     require("cv2")
     import cv2
@@ -121,23 +123,24 @@ def measure(mask: Mask, shape: Shape) -> Measures | None:
     # A single pixel has a spread, too.
     radius = max(((moments["mu20"] + moments["mu02"]) / area) ** 0.5, 0.4)
     if shape is Shape.HU:
-        told = signed_roots(np.asarray(cv2.HuMoments(moments), dtype=np.float64)[:, 0])
+        described = signed_roots(np.asarray(cv2.HuMoments(moments), dtype=np.float64)[:, 0])
     else:
-        told = _grid(mask, x, y, radius)
-    return Measures(told, float(x), -float(y), float(radius))
+        described = _grid(mask, x, y, radius)
+    return Measures(described, float(x), -float(y), float(radius))
 
 
 def signed_roots(hu: npt.NDArray[Any]) -> FloatArray:
-    """Hu's moments (..., 7), each with the root of its degree and its sign.
+    """The root of each of Hu's moments (..., 7), by its degree, with the moment's sign.
 
-    The moments span many powers of ten. Their logarithms are often taken, but where a moment
-    passes through 0, as four of them do whenever a shape is symmetric, they jump; roots do not.
+    The moments span many powers of ten, so their logarithms are often used. But a logarithm jumps
+    where a moment passes through 0, as four of them do whenever a shape is symmetric; a root does
+    not.
     """
     return np.asarray(np.sign(hu) * np.abs(hu) ** (1.0 / _DEGREES), dtype=np.float64)
 
 
 def _grid(mask: Mask, x: float, y: float, radius: float) -> FloatArray:
-    """Covered shares (96,) of the cells of a grid about a point."""
+    """Covered shares (96,) of the cells of a grid about a point; all in pixels."""
     import cv2
 
     rows, columns = mask.shape
@@ -153,16 +156,16 @@ def _grid(mask: Mask, x: float, y: float, radius: float) -> FloatArray:
 
 
 def speeds(tracks: npt.NDArray[Any], span: int, fps: float) -> npt.NDArray[Any]:
-    """Mean speed over the last frames, from one row a frame.
+    """Mean speed over the last frames of each frame.
 
     Args:
-        tracks: (frames, ...) of one clip.
-        span: Over how many frames; fewer at the beginning, where the first frame takes the
-            second one's.
+        tracks: (frames, ...) positions in one clip.
+        span: Over how many frames. There are fewer at the beginning; the first frame has the
+            second one's speed.
         fps: Frames per second.
 
     Returns:
-        As `tracks`, per second.
+        Same shape as `tracks`, per second.
     """
     now = np.arange(len(tracks))
     now[0] = min(1, len(tracks) - 1)

@@ -1,7 +1,7 @@
 """What every frame of a database looks like from every viewpoint (Lee et al. 2002, section 5.3).
 
-A row is the shape of a silhouette, the speed of its centre to the right and up, and how fast it
-grows. Rows of video are brought to the same numbers, so that their distance says how alike two
+A row holds the shape of a silhouette, the speed of its centre to the right and up, and how fast it
+grows. Rows of video are made the same way, so that the distance of two rows says how unlike two
 moments look.
 """
 
@@ -42,12 +42,12 @@ FORMAT = ArchiveFormat(
     max_text=2_000,
     max_bytes=1 << 30,
 )
-"""What a file of silhouettes holds."""
+"""The file of silhouettes."""
 
-# Frames from which the principal components are found.
+# Principal components are found from at least so many frames, if there are so many.
 _SAMPLE = 1000
-# Frames from one word of progress to the next.
-_TOLD_EVERY = 50
+# Frames from one report of progress to the next.
+_PROGRESS_EVERY = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +56,11 @@ class ViewTable:
 
     Attributes:
         rows: (n, views, d) float32; the squared distance of two says how unlike they look.
-        mean: (m,) of what is measured: the shape, two speeds, growth.
-        projection: (m, d) from what is measured, less the mean, to a row.
+        mean: (m,) mean of what is measured: the shape, two speeds, growth.
+        projection: (m, d) matrix from what is measured, less the mean, to a row.
         fps: Frames per second of the database.
-        config: What is compared.
-        views: From where.
+        config: Which features are compared.
+        views: The viewpoints.
         identity: Short hash of the database, the character and the settings.
     """
 
@@ -90,23 +90,25 @@ class ViewTable:
 
         Args:
             database: The frames.
-            config: What is compared.
-            views: From where.
-            character: Whose they are, by default the product's own.
-            progress: Told how many frames are done, and of how many.
+            config: Which features are compared.
+            views: The viewpoints.
+            character: Whose motions they are, by default the product's own.
+            progress: Called with how many frames are done, and of how many.
         """
         config, views = config or FeatureConfig(), views or Viewpoints()
         character = character or default_character()
-        shape_mean, basis = shape_basis(_sampled(database.poses, character, views, config), config)
-        shapes, tracks, radii = _measured(
+        shape_mean, basis = shape_basis(
+            _sample_shapes(database.poses, character, views, config), config
+        )
+        shapes, tracks, radii = _measure_frames(
             database.poses, character, views, config.shape, shape_mean, basis, progress
         )
-        motion = _motion(database, views, tracks, radii, config)
-        mean, projection = joined(shape_mean, basis, motion, config)
-        # Shapes have been projected already, a frame at a time: all as measured would be large.
+        motion = _centre_motion(database, views, tracks, radii, config)
+        mean, projection = full_projection(shape_mean, basis, motion, config)
+        # Shapes were projected frame by frame: all of them as measured would be large.
         moving = (motion - mean[-3:]) @ projection[-3:, -3:]
         rows = np.concatenate([shapes, moving], axis=2)
-        # Three digits are more than a silhouette has; as in the file.
+        # As in the file; a silhouette is less exact than three digits.
         kept = rows.astype(np.float16).astype(np.float32)
         identity = table_identity(database, config, views)
         return cls(kept, mean, projection, database.fps, config, views, identity)
@@ -117,12 +119,12 @@ class ViewTable:
         return max(1, round(self.config.span_s * self.fps))
 
     def row(self, measured: npt.ArrayLike) -> npt.NDArray[np.float32]:
-        """Rows (..., d) of what was measured (..., m): shape, speeds to the right and up, growth.
+        """Rows (..., d) from what was measured (..., m): shape, speeds to the right and up, growth.
 
-        Speeds in silhouette radii a second, growth in its logarithm a second.
+        Speeds are in silhouette radii a second; growth is of the radius's logarithm, per second.
         """
-        apart = np.asarray(measured, dtype=np.float64) - self.mean
-        return np.asarray(apart @ self.projection, dtype=np.float32)
+        centred = np.asarray(measured, dtype=np.float64) - self.mean
+        return np.asarray(centred @ self.projection, dtype=np.float32)
 
     def save(self, path: str | Path) -> None:
         """Write the table; the same table gives the same bytes.
@@ -135,7 +137,7 @@ class ViewTable:
             path,
             {
                 "identity": text_array(self.identity),
-                "config": text_array(_told(self.config)),
+                "config": text_array(_config_text(self.config)),
                 "viewpoints": text_array(json.dumps(dataclasses.asdict(self.views))),
                 "rows": self.rows.astype("<f2"),
                 "mean": self.mean.astype("<f8"),
@@ -153,66 +155,66 @@ class ViewTable:
         path = Path(path)
         arrays = FORMAT.read(path)
         try:
-            told = json.loads(arrays["config"].item())
-            config = FeatureConfig(**{**told, "shape": Shape(told["shape"])})
+            settings = json.loads(arrays["config"].item())
+            config = FeatureConfig(**{**settings, "shape": Shape(settings["shape"])})
             views = Viewpoints(**json.loads(arrays["viewpoints"].item()))
         except (DynrespError, AttributeError, KeyError, TypeError, ValueError) as error:
             FORMAT.fail(path, f"does not hold silhouettes: {error}")
         rows, mean, projection = arrays["rows"], arrays["mean"], arrays["projection"]
         fits = rows.shape[:2] == (len(database), views.count)
         if arrays["identity"].item() != table_identity(database, config, views) or not fits:
-            FORMAT.fail(path, "shows the frames of another graph; delete it, and it is made anew")
-        whole = len(mean) == len(projection) and rows.shape[2] == projection.shape[1]
-        if not (whole and all(np.isfinite(x).all() for x in (rows, mean, projection))):
+            FORMAT.fail(path, "shows the frames of another graph; delete it, and it is made again")
+        fits = len(mean) == len(projection) and rows.shape[2] == projection.shape[1]
+        if not (fits and all(np.isfinite(x).all() for x in (rows, mean, projection))):
             FORMAT.fail(path, "does not hold silhouettes: its arrays do not fit together")
         identity = arrays["identity"].item()
         return cls(rows.astype(np.float32), mean, projection, database.fps, config, views, identity)
 
 
 def table_identity(database: MotionDatabase, config: FeatureConfig, views: Viewpoints) -> str:
-    """Short hash of all that a table follows from."""
+    """Short hash of everything that a table depends on."""
     digest = hashlib.sha256(f"{database.character} {database.fps:.9g}".encode())
     for clip in database.clips:
         digest.update(f" {clip.identity} {clip.stop}".encode())
-    digest.update(f" {_told(config)} {views}".encode())
+    digest.update(f" {_config_text(config)} {views}".encode())
     return digest.hexdigest()[:16]
 
 
-def _told(config: FeatureConfig) -> str:
+def _config_text(config: FeatureConfig) -> str:
     return json.dumps({**dataclasses.asdict(config), "shape": config.shape.value}, sort_keys=True)
 
 
-def shape_basis(told: FloatArray, config: FeatureConfig) -> tuple[FloatArray, FloatArray]:
-    """What leads from the shapes of a database to weighted, standard numbers.
+def shape_basis(shapes: FloatArray, config: FeatureConfig) -> tuple[FloatArray, FloatArray]:
+    """How shapes become numbers of a row: of a common scale, and weighted.
 
     Args:
-        told: (s, m) shapes of some silhouettes, as `measure` tells them.
-        config: What is compared.
+        shapes: (s, m) shapes of some silhouettes, as `measure` gives them.
+        config: Which features are compared.
 
     Returns:
-        Their mean (m,), and the matrix (m, k) for what is left without it.
+        Their mean (m,), and the matrix (m, k) by which a shape less the mean is multiplied.
     """
-    mean, weight = told.mean(axis=0), np.sqrt(config.shape_weight)
+    mean, weight = shapes.mean(axis=0), np.sqrt(config.shape_weight)
     if config.shape is Shape.HU:
-        return mean, np.diag(weight / np.maximum(told.std(axis=0), 1e-9))
-    variances, vectors = np.linalg.eigh(np.cov(told.T))
+        return mean, np.diag(weight / np.maximum(shapes.std(axis=0), 1e-9))
+    variances, vectors = np.linalg.eigh(np.cov(shapes.T))
     first = vectors[:, ::-1][:, : config.components]
-    # Which way a component points is chance; its largest number be positive.
+    # The sign of a component is arbitrary: make its largest number positive.
     largest = np.abs(first).argmax(axis=0)
     first = first * np.sign(first[largest, np.arange(first.shape[1])])
     return mean, first * (weight / np.sqrt(max(variances[-1], 1e-12)))
 
 
-def joined(
+def full_projection(
     shape_mean: FloatArray, basis: FloatArray, motion: FloatArray, config: FeatureConfig
 ) -> tuple[FloatArray, FloatArray]:
     """`ViewTable.mean` and `ViewTable.projection`.
 
     Args:
         shape_mean: (m,) as `shape_basis` gives it.
-        basis: (m, k) likewise.
+        basis: (m, k) as `shape_basis` gives it.
         motion: (..., 3) speeds to the right and up, and growth, of all frames.
-        config: What is compared.
+        config: Which features are compared.
     """
     of_all = tuple(range(motion.ndim - 1))
     weights = np.sqrt([config.speed_weight, config.speed_weight, config.growth_weight])
@@ -223,21 +225,21 @@ def joined(
     return np.concatenate([shape_mean, motion.mean(axis=of_all)]), projection
 
 
-def sampled(count: int) -> slice:
-    """The frames of so many from which the principal components are found."""
+def sample_slice(count: int) -> slice:
+    """Which of `count` frames the principal components are found from."""
     return slice(None, None, max(1, count // _SAMPLE))
 
 
-def _sampled(
+def _sample_shapes(
     poses: FloatArray, character: Character, views: Viewpoints, config: FeatureConfig
 ) -> FloatArray:
-    """Shapes (s, m) of some frames from all viewpoints."""
-    drawn = draw_silhouettes(poses[sampled(len(poses))], character, views)
+    """Shapes (s, m) of a sample of the frames, from all viewpoints."""
+    drawn = draw_silhouettes(poses[sample_slice(len(poses))], character, views)
     every = (measure(mask, config.shape) for _, _, mask in drawn)
     return np.array([measured.shape for measured in every if measured is not None])
 
 
-def _measured(
+def _measure_frames(
     poses: FloatArray,
     character: Character,
     views: Viewpoints,
@@ -246,9 +248,9 @@ def _measured(
     basis: FloatArray,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[npt.NDArray[np.float32], FloatArray, FloatArray]:
-    """Shapes (n, views, k), and of the silhouettes centres (n, views, 2) and radii (n, views) [m].
+    """Shapes (n, views, k), and centres (n, views, 2) and radii (n, views) of silhouettes [m].
 
-    Centres are in the pictures of a camera at the origin of each clip's world.
+    Centres are right and up in the pictures of a camera at the origin of each clip's world.
     """
     shapes = np.empty((len(poses), views.count, basis.shape[1]), dtype=np.float32)
     tracks = np.empty((len(poses), views.count, 2))
@@ -256,14 +258,14 @@ def _measured(
     of_frame = np.empty((views.count, len(mean)))
     for frame, view, mask in draw_silhouettes(poses, character, views):
         measured = measure(mask, shape)
-        # The pelvis is in the middle of the picture, and seen from everywhere.
+        # The pelvis is in the middle of the picture, so no silhouette is empty.
         assert measured is not None
         of_frame[view] = measured.shape
         tracks[frame, view] = measured.right, measured.up
         radii[frame, view] = measured.radius
         if view == views.count - 1:
             shapes[frame] = (of_frame - mean) @ basis
-            if progress is not None and frame % _TOLD_EVERY == 0:
+            if progress is not None and frame % _PROGRESS_EVERY == 0:
                 progress(frame, len(poses))
     right, up, _ = views.axes()
     tracks *= PIXEL
@@ -272,14 +274,14 @@ def _measured(
     return shapes, tracks, radii * PIXEL
 
 
-def _motion(
+def _centre_motion(
     database: MotionDatabase,
     views: Viewpoints,
     tracks: FloatArray,
     radii: FloatArray,
     config: FeatureConfig,
 ) -> FloatArray:
-    """(n, views, 3) speeds of the centres [radii/s] and growth [1/s], inside each clip."""
+    """(n, views, 3) speeds of the centres [radii/s] and growth [1/s], clip by clip."""
     _, _, away = views.axes()
     depths = database.poses[:, ROOT] @ away.T
     logs = np.log(radii) - depths / config.distance_m

@@ -1,9 +1,8 @@
-"""Silhouettes of the character, drawn as filled shapes from viewpoints all around it.
+"""Draw silhouettes of the character as filled shapes, from viewpoints all around it.
 
-A camera far away: rays are parallel, so that a picture has one scale [m]. The outline of a capsule
-is then a stadium, that of a ball a circle, and that of a box a hexagon; OpenCV fills them with the
-pixels on their edges, so that a silhouette is about a centimetre wider all around, as clothes make
-it.
+The camera is far away: its rays are parallel, so a picture has one scale [m]. So the outline of a
+capsule is a stadium, that of a ball a circle, and that of a box a hexagon. OpenCV fills the pixels
+on their edges, too. That makes a silhouette about a centimetre wider all around, as clothes do.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ Mask = npt.NDArray[np.uint8]
 PIXEL = 0.03
 """Size of a pixel [m]."""
 SIZE = 96
-"""Pixels along a side: 2.9 m, the pelvis in the middle."""
+"""Pixels along a side: 2.9 m, with the pelvis in the middle."""
 
-# OpenCV takes coordinates in this many fractional bits.
+# Fractional bits of the coordinates that OpenCV gets.
 _SHIFT = 4
 # Points on each of the two round ends of a stadium.
 _ROUND = 7
@@ -39,10 +38,10 @@ _CHUNK = 256
 
 @dataclass(frozen=True)
 class Viewpoints:
-    """Cameras at equal angles around the vertical, all looking down by the same angle.
+    """Cameras at equal angles around the vertical, which all look down by the same angle.
 
     Attributes:
-        count: How many; the paper has 18 (section 5.3).
+        count: Number of cameras; the paper has 18 (section 5.3).
         elevation: How far they look down [rad].
     """
 
@@ -55,7 +54,7 @@ class Viewpoints:
         return 2.0 * math.pi / self.count
 
     def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Which way is right, up and away in the pictures: (count, 3) unit vectors of the world.
+        """The directions right, up and away in the pictures: (count, 3) unit vectors of the world.
 
         Camera 0 looks along +X; the next one looks further to the left.
         """
@@ -76,12 +75,12 @@ def draw_silhouettes(
     Args:
         poses: (n, 59).
         character: Whose poses they are.
-        views: From where.
+        views: The viewpoints.
 
     Yields:
-        Pose, viewpoint, and the picture (SIZE, SIZE), top row first: 1 inside, 0 outside. The
-        pelvis (the root) is where four pixels meet in the middle. The picture is drawn over by
-        the next one.
+        Numbers of pose and viewpoint, and the picture (SIZE, SIZE), top row first: 1 inside, 0
+        outside. The pelvis (the root) is where four pixels meet in the middle. The next picture
+        overwrites this one.
     """
     require("cv2")
     import cv2
@@ -145,34 +144,37 @@ def _solids(character: Character) -> _Solids:
 def _outlines(
     poses: FloatArray, character: Character, solids: _Solids, right: FloatArray, up: FloatArray
 ) -> list[npt.NDArray[np.int32]]:
-    """Outlines of all solids, each (frames, views, points, 2), in OpenCV's fixed point numbers."""
+    """Outlines of all solids, each (frames, views, points, 2), in OpenCV's fixed-point numbers."""
     states = character.kinematics(poses)
     root = states.positions[:, :1]
     axes = np.stack([right, -up], axis=-1)  # (views, 3, 2): columns and rows of the picture
 
-    def placed(bodies: npt.NDArray[np.intp], points: FloatArray, turned_only: bool) -> FloatArray:
-        """Points (k, p, 3) of bodies (k,) in the pictures: (frames, views, k, p, 2) [m]."""
+    def seen(bodies: npt.NDArray[np.intp], points: FloatArray, turned_only: bool) -> FloatArray:
+        """Points (k, p, 3) of bodies (k,) in the pictures: (frames, views, k, p, 2) [m].
+
+        With `turned_only` they are vectors, which the body's position does not move.
+        """
         world = rotations.rotate(states.quaternions[:, bodies, None], points)
         if not turned_only:
             world += (states.positions[:, bodies] - root)[:, :, None]
         return np.einsum("fkpx,vxc->fvkpc", world, axes)
 
-    ends = placed(solids.round_bodies, solids.ends, turned_only=False)
+    ends = seen(solids.round_bodies, solids.ends, turned_only=False)
     along = ends[..., 1, :] - ends[..., 0, :]
     angle = np.arctan2(along[..., 1], along[..., 0])[..., None]
     swing = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ROUND)
-    # Points on a circle span less than it; a little more radius makes up for it.
+    # A polygon in a circle covers less than the circle; a slightly larger radius makes up for it.
     radii = solids.radii[:, None] / math.cos(0.25 * math.pi / (_ROUND - 1))
     arc = angle + swing
     offset = np.stack([radii * np.cos(arc), radii * np.sin(arc)], axis=-1)
     stadium = np.concatenate(
         [ends[..., 1:2, :] + offset, ends[..., 0:1, :] - offset], axis=-2
     )  # fmt: skip
-    center = placed(solids.box_bodies, solids.centers[:, None], turned_only=False)
-    edges = placed(solids.box_bodies, solids.half_edges, turned_only=True)
+    center = seen(solids.box_bodies, solids.centers[:, None], turned_only=False)
+    edges = seen(solids.box_bodies, solids.half_edges, turned_only=True)
     shapes = [stadium[:, :, k] for k in range(len(solids.radii))]
     shapes += [center[:, :, k] + _hexagon(edges[:, :, k]) for k in range(len(solids.centers))]
-    # A pixel's centre has whole numbers in OpenCV.
+    # In OpenCV, whole numbers are the centres of pixels.
     return [
         np.round((shape / PIXEL + 0.5 * (SIZE - 1)) * (1 << _SHIFT)).astype(np.int32)
         for shape in shapes
@@ -182,8 +184,8 @@ def _outlines(
 def _hexagon(edges: FloatArray) -> FloatArray:
     """Outline (..., 6, 2) of a box about its centre from its half edges (..., 3, 2) in the picture.
 
-    It is the sum of three segments: turned to point upwards and sorted by direction, they are its
-    sides.
+    The outline of a box is the sum of three segments, its edges. Turned to point upwards and sorted
+    by direction, they are the sides of the hexagon.
     """
     upwards = np.where(edges[..., 1:] < 0, -edges, edges)
     order = np.argsort(np.arctan2(upwards[..., 1], upwards[..., 0]), axis=-1)

@@ -1,13 +1,13 @@
-"""Dynamic time warping: how alike two sequences are when their speeds may differ.
+"""Dynamic time warping: how alike two sequences are if their speeds may differ.
 
-Rows are matched in order, each at least once, so that the sum of distances is least (the recurrence
-of Bruderlin and Williams 1995 with steps along either sequence or along both at once, all of equal
-weight). Lee et al. 2002 compare sketched paths (section 5.2) and video (section 5.3) with motion
+Rows are matched in order, each at least once, with the least sum of distances: the recurrence of
+Bruderlin and Williams 1995, with steps along either sequence or along both at once, all of equal
+weight. Lee et al. 2002 compare sketched paths (section 5.2) and video (section 5.3) with motion
 this way.
 
-The kernel is our own. Libraries for it compare whole sequences with whole ones, or a short one
-with its best place in a long one; here one sequence is compared with the beginnings of many of
-different lengths, ten times a second, and nothing but NumPy and numba has to be installed.
+The kernel is our own. Libraries compare whole sequences with whole ones, or find a short one in a
+long one. Here one sequence is compared with the beginnings of many sequences of different lengths,
+ten times a second, and needs nothing but NumPy and numba.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ def warp_onto(
     Args:
         first: (m, d) rows, or (m,) numbers.
         candidates: Each (n, d) or (n,); n may differ.
-        open_end: Whether `first` may end before a candidate does: the rows at the candidate's end
-            then stay unmatched, as many as makes the cost least.
+        open_end: Whether `first` may end before a candidate does. Then so many rows at the
+            candidate's end stay unmatched that the cost is least.
 
     Raises:
-        MotionError: A sequence is empty or not finite, or widths differ.
+        MotionError: A sequence is empty or not finite, or the widths differ.
     """
     sequences = [
         _rows(first, "first"),
@@ -56,7 +56,7 @@ def warp_onto(
     widths = {rows.shape[1] for rows in sequences}
     if len(widths) > 1:
         raise MotionError(
-            f"sequences to be warped must have rows of one width, got {sorted(widths)}"
+            f"all sequences to warp must have rows of one width, got widths {sorted(widths)}"
         )
     rows = np.concatenate(sequences[1:]) if len(sequences) > 1 else np.empty((0, widths.pop()))
     offsets = np.cumsum([0, *(len(s) for s in sequences[1:])])
@@ -66,12 +66,12 @@ def warp_onto(
 def warp_onto_rows(
     first: FloatArray, rows: FloatArray, offsets: npt.NDArray[np.int64], open_end: bool
 ) -> Warping:
-    """`warp_onto` for candidates that lie end to end, unchecked: for loops that run often.
+    """`warp_onto` without checks, for candidates in one array: for loops that run often.
 
     Args:
         first: (m, d), m at least 1.
-        rows: (total, d) the candidates.
-        offsets: (k + 1,) where each begins and the last ends; none is empty.
+        rows: (total, d) the candidates, one after the other.
+        offsets: (k + 1,) where each candidate begins, and the last ends; none is empty.
         open_end: As in `warp_onto`.
     """
     # Numba takes a third of a second to import.
@@ -96,6 +96,7 @@ def _rows(sequence: npt.ArrayLike, what: str) -> FloatArray:
         rows = rows[:, None]
     if rows.ndim != 2 or 0 in rows.shape or not np.isfinite(rows).all():
         raise MotionError(
-            f"{what} of a warping must be (rows, width), not empty and finite, got {rows.shape}"
+            f"{what} to warp must be finite, of shape (rows, width), and not empty, got "
+            f"shape {rows.shape}"
         )
     return rows

@@ -1,4 +1,4 @@
-"""The compiled part of dynamic time warping.
+"""The compiled loop of `dynresp.locomotion.vision.time_warping`.
 
 Importing this module compiles it (about a second) or loads it from numba's cache; import it where
 it is used.
@@ -22,20 +22,20 @@ _SIGNATURE = types.void(
 
 @compiled(_SIGNATURE)
 def warp_kernel(first, rows, offsets, open_end, costs, stops):
-    """Warp one sequence onto each of many; see `warping.warp_onto`.
+    """Warp one sequence onto each of many; see `time_warping.warp_onto`.
 
     Args:
         first: (m, d), m at least 1.
-        rows: (total, d) the others, end to end.
-        offsets: (k + 1,) where each begins; none is empty.
-        open_end: Whether rows at the end of the others may stay unmatched.
-        costs: Out, (k,).
-        stops: Out, (k,) how many rows of each are matched.
+        rows: (total, d) the candidates, one after the other.
+        offsets: (k + 1,) where each candidate begins, and the last ends; none is empty.
+        open_end: Whether rows at the end of the candidates may stay unmatched.
+        costs: Out, (k,) sums of distances over the matched pairs of rows.
+        stops: Out, (k,) how many rows of each candidate are matched.
     """
     longest = 0
     for k in range(len(costs)):
         longest = max(longest, offsets[k + 1] - offsets[k])
-    # reached[j]: least cost of matching the rows of `first` so far with the first j + 1 others.
+    # reached[j]: least cost of matching `first` so far with the candidate's first j + 1 rows.
     reached = np.empty(longest)
     for k in range(len(costs)):
         start, size = offsets[k], offsets[k + 1] - offsets[k]
@@ -45,14 +45,14 @@ def warp_kernel(first, rows, offsets, open_end, costs, stops):
                 corner = 0.0
             left = math.inf
             for j in range(size):
-                apart = 0.0
+                squared = 0.0
                 for c in range(first.shape[1]):
                     difference = first[i, c] - rows[start + j, c]
-                    apart += difference * difference
+                    squared += difference * difference
                 above = math.inf
                 if i > 0:
                     above = reached[j]
-                left = math.sqrt(apart) + min(corner, min(above, left))
+                left = math.sqrt(squared) + min(corner, min(above, left))
                 reached[j] = left
                 corner = above
         stop = size - 1

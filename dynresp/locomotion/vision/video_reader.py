@@ -1,4 +1,4 @@
-"""Pictures from a file or a camera, within bounds."""
+"""Read pictures from a video file or a camera, of limited size and number."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from dynresp.support.extras import require
 Picture = npt.NDArray[np.uint8]
 
 MAX_SIDE = 8192
-"""Most pixels along a side of a picture."""
+"""Largest number of pixels along a side of a picture."""
 MAX_FRAMES = 1_000_000
-"""Most pictures of one video: nine hours at 30 a second."""
-# What files and cameras say of their rate is taken within these bounds.
+"""Largest number of pictures of a video: nine hours at 30 a second."""
+# Frame rates that are believed of a file or a camera [1/s]; and that of a camera that gives no such
+# rate.
 _FPS_RANGE = (1.0, 1000.0)
 _USUAL_FPS = 30.0
 
@@ -28,16 +29,16 @@ class Video:
     """An open video; use it in a `with` block.
 
     Attributes:
-        name: What was opened, for people.
-        fps: Pictures per second, as the file or camera says; 30 of a camera that does not say.
-        length: Pictures it holds, as the file says; None of a camera, and where it does not say.
+        name: What was opened, for messages.
+        fps: Pictures per second, as the file or camera says; 30 for a camera that does not say.
+        length: Number of pictures, as the file says; None for a camera or if the file does not say.
     """
 
     def __init__(self, source: Path | str | int) -> None:
         """Open a file, or a camera by its number (0 is the first).
 
         Raises:
-            MotionFileError: It cannot be opened, is no video, its name is not UTF-8, or its
+            MotionFileError: It cannot be opened, is not a video, its name is not UTF-8, or its
                 pictures are too large.
         """
         require("cv2")
@@ -54,9 +55,9 @@ class Video:
         try:
             self.name.encode()
         except UnicodeEncodeError:
-            said = self.name.encode(errors="backslashreplace").decode()
-            raise MotionFileError(f"{said}: the name is not UTF-8; rename the file") from None
-        # OpenCV warns on standard error of what it cannot read; the errors below say it.
+            escaped = self.name.encode(errors="backslashreplace").decode()
+            raise MotionFileError(f"{escaped}: the name is not UTF-8; rename the file") from None
+        # OpenCV writes to standard error what it cannot read; the errors below say that.
         level = cv2.utils.logging.getLogLevel()
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         try:
@@ -66,7 +67,7 @@ class Video:
         if not self._capture.isOpened():
             self._capture.release()
             help_text = (
-                "look whether it is plugged in and not in use"
+                "check that it is plugged in and that no other program uses it"
                 if is_camera
                 else "expected a video that OpenCV reads, such as MP4 (H.264), AVI (MJPG) or WebM"
             )
@@ -78,21 +79,21 @@ class Video:
         if max(width, height) > MAX_SIDE:
             self._capture.release()
             raise MotionFileError(
-                f"{self.name}: pictures of {width} x {height} pixels; at most {MAX_SIDE} along a "
-                "side are read, make them smaller"
+                f"{self.name}: its pictures have {width} x {height} pixels; expected at most "
+                f"{MAX_SIDE} along a side, make them smaller"
             )
         length = float(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         self.length = int(length) if not is_camera and 1.0 <= length <= MAX_FRAMES else None
-        told = float(self._capture.get(cv2.CAP_PROP_FPS))
+        fps = float(self._capture.get(cv2.CAP_PROP_FPS))
         low, high = _FPS_RANGE
-        if math.isfinite(told) and low <= told <= high:
-            self.fps = told
+        if math.isfinite(fps) and low <= fps <= high:
+            self.fps = fps
         elif is_camera:
             self.fps = _USUAL_FPS
         else:
             self._capture.release()
             raise MotionFileError(
-                f"{self.name}: says that it has {told:g} pictures a second; expected {low:g} to "
+                f"{self.name}: says that it has {fps:g} pictures a second; expected {low:g} to "
                 f"{high:g}"
             )
 
@@ -108,18 +109,18 @@ class Video:
         """The pictures (height, width, 3), blue green red, as bytes.
 
         Raises:
-            MotionFileError: There is none at all, one is too large, or there are too many.
+            MotionFileError: There are no pictures or too many, or one is too large.
         """
         for count in range(MAX_FRAMES):
-            there, picture = self._capture.read()
-            if not there:
+            found, picture = self._capture.read()
+            if not found:
                 if count == 0:
                     raise MotionFileError(f"{self.name}: holds no picture that can be read")
                 return
             if max(picture.shape[:2]) > MAX_SIDE:
                 raise MotionFileError(
                     f"{self.name}: picture {count} has {picture.shape[1]} x {picture.shape[0]} "
-                    f"pixels; at most {MAX_SIDE} along a side are read"
+                    f"pixels; expected at most {MAX_SIDE} along a side"
                 )
             yield np.asarray(picture, dtype=np.uint8)
-        raise MotionFileError(f"{self.name}: has more than {MAX_FRAMES:,} pictures; cut it")
+        raise MotionFileError(f"{self.name}: has more than {MAX_FRAMES:,} pictures; shorten it")

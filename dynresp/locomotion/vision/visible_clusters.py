@@ -1,11 +1,11 @@
-"""Cluster frames by what a camera can see: where the limbs are and how the person moves.
+"""Cluster frames by what a camera can see: where the limbs are, and how the person moves.
 
-Control by choice and by sketch cluster joint angles (eq. 4 of Lee et al. 2002). A silhouette does
-not show the twist of an upper arm about its own axis, and skeletons from different sources differ
-most in that twist once they are mapped onto one character. So control by video clusters positions:
-head, hands, elbows, shoulders, knees and feet relative to the pelvis in the facing frame, the
-height of the pelvis, and the speeds ahead, to the left and of turning. All are averaged over a
-walk's cycle, so that a cluster is an action and not a phase of one.
+Control by choice and by sketch cluster joint angles (eq. 4 of Lee et al. 2002). But a silhouette
+does not show the twist of an upper arm about its own axis, and skeletons from different sources,
+mapped onto one character, differ most in that twist. So control by video clusters positions: of
+head, hands, elbows, shoulders, knees and feet, relative to the pelvis and the facing. With them go
+the height of the pelvis and the speeds ahead, to the left and of turning. All are averaged over the
+cycle of a walk, so that a cluster is an action and not a phase of an action.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from dynresp.motion.character import ROOT, ROOT_QUAT, Character, default_charact
 from dynresp.motion.rotations import FloatArray
 
 MAX_VISIBLE_CLUSTERS = 5
-"""Default limit on the number of clusters: more of them look too much alike from some sides."""
+"""Default limit on the number of clusters: more would look too much alike from some sides."""
 CLUSTERING_VERSION = 2
-"""Raised when the same frames give other clusters; it belongs to the identity of kept clusters.
+"""Part of the identity of kept clusters; raise it when the same frames give other clusters.
 Version 2 drops empty clusters."""
 
 _BODIES = (
@@ -31,22 +31,22 @@ _BODIES = (
     "right_shank", "left_upper_arm", "right_upper_arm", "chest",
 )  # fmt: skip
 _HANDS = ("left_forearm", "right_forearm")
-# The hand in the frame of the forearm [m].
+# Position of the hand in the frame of the forearm [m].
 _HAND = np.array([0.0, 0.0, -0.3])
-# Weights of a metre of a limb, a metre of height, a metre a second and a radian a second.
+# Weights: of a limb's position [1/m], of the height [1/m], of a speed [s/m] and of turning [s/rad].
 _LIMB, _HEIGHT, _SPEED, _TURN = 0.5, 3.0, 0.7, 0.2
 OBSERVATION_SIZE = 3 * (len(_BODIES) + len(_HANDS)) + 4
-"""How many numbers an observation has: positions, height and three speeds."""
+"""Numbers in an observation: positions, height and three speeds."""
 # Speeds are means over this time [s].
 _SPEED_S = 0.4
 
 
 def visible_observations(database: MotionDatabase, character: Character) -> FloatArray:
-    """One observation a frame.
+    """One observation for each frame: what a camera can see of it, weighted.
 
     Args:
         database: The frames.
-        character: Whose they are.
+        character: Whose motions they are.
 
     Returns:
         (n, `OBSERVATION_SIZE`).
@@ -85,8 +85,8 @@ def find_visible_clusters(
     """Cluster the frames of a graph by what a camera can see.
 
     Args:
-        graph: Its frames count.
-        max_clusters: Most clusters.
+        graph: Its frames are clustered.
+        max_clusters: Largest number of clusters.
         character: Whose motions they are, by default the product's own.
 
     Raises:
