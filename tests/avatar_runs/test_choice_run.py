@@ -24,7 +24,7 @@ def action(*corners: tuple[float, float, float]) -> OfferedAction:
 
 
 @pytest.mark.parametrize(
-    ("corners", "said"),
+    ("corners", "description"),
     [
         (((0, 0, 0), (2, 0, 10)), "goes 2.0 m ahead, in 1.0 s"),
         (((0, 0, 90), (2, 0, 0)), "goes 2.0 m to the right, turns 90 deg right, in 1.0 s"),
@@ -35,10 +35,10 @@ def action(*corners: tuple[float, float, float]) -> OfferedAction:
         (((5, 5, 165), (5, 5, -165)), "stays, turns 30 deg left, in 1.0 s"),
     ],
 )
-def test_actions_describe_action(
-    corners: tuple[tuple[float, float, float], ...], said: str
+def test_an_action_is_described_in_words(
+    corners: tuple[tuple[float, float, float], ...], description: str
 ) -> None:
-    assert describe_action(action(*corners), 1.0) == said
+    assert describe_action(action(*corners), 1.0) == description
 
 
 def test_given_answers(forest: ClusterForest, character: Character, tmp_path: Path) -> None:

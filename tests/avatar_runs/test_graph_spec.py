@@ -29,7 +29,7 @@ motion = "builtin:walk"
 """
 
 
-def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
+def test_missing_keys_have_defaults(tmp_path: Path) -> None:
     spec = read_graph_spec(written(tmp_path, SMALL))
     assert spec.graph.config() == GraphConfig()
     assert spec.graph.world == "flat"
@@ -37,12 +37,12 @@ def test_what_is_left_out_is_as_usual(tmp_path: Path) -> None:
 
 
 def test_settings(tmp_path: Path) -> None:
-    said = SMALL.replace(
+    text = SMALL.replace(
         'name = "small"',
         'name = "small"\nfps = 30\nmirrored = true\ncoordinates = "blocks"\nsigma = 0.2\n'
         "contact_change = false\nblend_s = 0.2",
     )
-    config = read_graph_spec(written(tmp_path, said)).graph.config()
+    config = read_graph_spec(written(tmp_path, text)).graph.config()
     assert (config.fps, config.mirrored, config.sigma) == (30.0, True, 0.2)
     assert config.coordinates is Coordinates.BLOCKS
     assert config.keeps_local_maxima
@@ -50,7 +50,7 @@ def test_settings(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("name", "nam", r"graph\.nam is not a key of \[graph\] \(did you mean 'name'\?\)"),
         ('name = "small"', "", "graph.name is missing; say in a few words"),
@@ -71,8 +71,8 @@ def test_settings(tmp_path: Path) -> None:
         ("[graph]", "[graph", "not valid TOML"),
     ],
 )
-def test_mistakes(tmp_path: Path, old: str, new: str, said: str) -> None:
-    with pytest.raises(SpecError, match=said):
+def test_wrong_specs_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
         read_graph_spec(written(tmp_path, SMALL.replace(old, new, 1)))
 
 

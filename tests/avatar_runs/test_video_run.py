@@ -1,4 +1,4 @@
-"""What is said of videos that end early or are too short, and when watching ends."""
+"""Remarks and errors about videos that end early or are too short; the end of watching."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -55,16 +55,16 @@ def watch(model: VideoModel, character: Character) -> Callable[..., list[str]]:
     return run
 
 
-def test_a_video_that_ends_early_is_remarked(watch: Callable[..., list[str]]) -> None:
-    (said,) = watch(60, 135)
-    assert said.startswith("mine.avi: 60 of the 135 pictures")
+def test_a_video_that_ends_early_gets_a_remark(watch: Callable[..., list[str]]) -> None:
+    (message,) = watch(60, 135)
+    assert message.startswith("mine.avi: 60 of the 135 pictures")
     assert watch(60, 65) == []
     assert watch(60, None) == []
     assert watch(100, 135, seconds=2.0) == []
 
 
 @pytest.mark.parametrize(
-    ("count", "length", "fps", "said"),
+    ("count", "length", "fps", "message"),
     [
         (1, None, 30.0, "mine.avi: 1 picture of video;"),
         (44, 44, 30.0, "1.46 s of video;"),
@@ -73,9 +73,9 @@ def test_a_video_that_ends_early_is_remarked(watch: Callable[..., list[str]]) ->
     ],
 )
 def test_too_short_a_video(
-    watch: Callable[..., list[str]], count: int, length: int | None, fps: float, said: str
+    watch: Callable[..., list[str]], count: int, length: int | None, fps: float, message: str
 ) -> None:
-    with pytest.raises(MotionFileError, match=re.escape(said)):
+    with pytest.raises(MotionFileError, match=re.escape(message)):
         watch(count, length, fps=fps)
 
 

@@ -9,7 +9,7 @@ from dynresp.support.errors import MotionFileError, UsageError
 
 
 class Clock:
-    """Shows what it is set to."""
+    """A clock that shows the time to which a test sets it."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -41,14 +41,14 @@ def test_a_slow_camera_shows_pictures_twice() -> None:
     assert given == [0, *(k for k in range(1, 30) for _ in range(2))]
 
 
-def test_of_a_fast_camera_pictures_are_left_out() -> None:
+def test_pictures_of_a_fast_camera_are_dropped() -> None:
     clock = Clock()
     given = numbers(evenly(delivered(clock, [k / 60.0 for k in range(120)]), 30.0, clock))
     assert given == list(range(0, 120, 2))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_number_of_pictures_tells_the_time(seed: int) -> None:
+def test_the_number_of_pictures_follows_the_time(seed: int) -> None:
     rng = np.random.default_rng(seed)
     clock = Clock()
     times = np.cumsum(rng.uniform(0.0, 0.2, 200))
@@ -65,13 +65,13 @@ def test_after_a_break_time_goes_on_where_it_stopped() -> None:
 
 def test_the_first_seconds_can_be_left_out() -> None:
     clock = Clock()
-    told: list[float] = []
-    pictures = later(delivered(clock, [0.5 * k for k in range(20)]), 5.0, told.append, clock)
+    seconds: list[float] = []
+    pictures = later(delivered(clock, [0.5 * k for k in range(20)]), 5.0, seconds.append, clock)
     assert numbers(pictures) == list(range(10, 20))
-    assert told == pytest.approx([0.5 * k for k in range(10)])
+    assert seconds == pytest.approx([0.5 * k for k in range(10)])
 
 
-def test_what_is_no_source() -> None:
+def test_wrong_sources_are_refused() -> None:
     for text in ("camera:", "camera:-1", "camera:x"):
         with pytest.raises(UsageError, match="camera:N"):
             open_source(text)

@@ -25,31 +25,31 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def sight(
+def model(
     graph: MotionGraph, character: Character, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> VideoModel:
     monkeypatch.setenv("DYNRESP_CACHE", str(cache))
     return VideoModel.of(graph, character, 2, lambda *_: None, pytest.fail)
 
 
-def test_what_is_read_is_what_was_learnt(
-    sight: VideoModel, graph: MotionGraph, character: Character
+def test_the_file_keeps_what_was_learnt(
+    model: VideoModel, graph: MotionGraph, character: Character
 ) -> None:
-    again = VideoModel.of(graph, character, 2, lambda *_: pytest.fail("made anew"), pytest.fail)
-    np.testing.assert_array_equal(again.table.rows, sight.table.rows)
-    a, b = again.forest.clusters, sight.forest.clusters
+    again = VideoModel.of(graph, character, 2, lambda *_: pytest.fail("made again"), pytest.fail)
+    np.testing.assert_array_equal(again.table.rows, model.table.rows)
+    a, b = again.forest.clusters, model.forest.clusters
     for name in ("labels", "log_probabilities", "examples"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     np.testing.assert_array_equal(a.mixture.means, b.mixture.means)
     assert (a.curve, a.spacing, a.bounded) == (b.curve, b.spacing, b.bounded)
-    seen = sight.table.rows[:20, 3]
+    seen = model.table.rows[:20, 3]
     np.testing.assert_array_equal(
-        again.recogniser.probabilities(seen), sight.recogniser.probabilities(seen)
+        again.recogniser.probabilities(seen), model.recogniser.probabilities(seen)
     )
 
 
 def test_another_bound_is_another_file(
-    sight: VideoModel, graph: MotionGraph, character: Character, cache: Path
+    model: VideoModel, graph: MotionGraph, character: Character, cache: Path
 ) -> None:
     stages = []
     VideoModel.of(graph, character, 3, lambda stage, *_: stages.append(stage), pytest.fail)
@@ -58,7 +58,7 @@ def test_another_bound_is_another_file(
 
 
 def test_another_version_of_the_clustering_is_another_file(
-    sight: VideoModel, graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
+    model: VideoModel, graph: MotionGraph, character: Character, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(visible_cluster_file, "CLUSTERING_VERSION", 0)
     stages = []
@@ -67,7 +67,7 @@ def test_another_version_of_the_clustering_is_another_file(
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("name", "value", "message"),
     [
         ("identity", np.array("another"), "another graph"),
         ("labels", np.full(180, 7, dtype="<i4"), "do not fit together"),
@@ -91,25 +91,30 @@ def test_another_version_of_the_clustering_is_another_file(
         ("ages", np.full(7, -1, dtype="<i4"), "not there"),
     ],
 )
-def test_files_that_make_no_sense(
-    sight: VideoModel, graph: MotionGraph, tmp_path: Path, name: str, value: np.ndarray, said: str
+def test_damaged_files_are_refused(
+    model: VideoModel,
+    graph: MotionGraph,
+    tmp_path: Path,
+    name: str,
+    value: np.ndarray,
+    message: str,
 ) -> None:
     path = tmp_path / "actions.npz"
-    save_actions(path, "mine", sight.forest.clusters, sight.recogniser)
-    assert len(load_actions(path, "mine", graph, sight.table)[0]) == 2
+    save_actions(path, "mine", model.forest.clusters, model.recogniser)
+    assert len(load_actions(path, "mine", graph, model.table)[0]) == 2
     with np.load(path, allow_pickle=False) as archive:
         arrays = {key: archive[key] for key in archive.files if key != "format_version"}
     FORMAT.write(path, {**arrays, name: value})
-    with pytest.raises(GraphFileError, match=said):
-        load_actions(path, "mine", graph, sight.table)
+    with pytest.raises(GraphFileError, match=message):
+        load_actions(path, "mine", graph, model.table)
 
 
-def test_infinite_weights_make_no_sense(
-    sight: VideoModel, graph: MotionGraph, tmp_path: Path
+def test_infinite_weights_are_refused(
+    model: VideoModel, graph: MotionGraph, tmp_path: Path
 ) -> None:
     path = tmp_path / "actions.npz"
-    first, last = sight.recogniser.weights
-    wrong = replace(sight.recogniser, weights=(np.full_like(first, np.inf), last))
-    save_actions(path, "mine", sight.forest.clusters, wrong)
+    first, last = model.recogniser.weights
+    wrong = replace(model.recogniser, weights=(np.full_like(first, np.inf), last))
+    save_actions(path, "mine", model.forest.clusters, wrong)
     with pytest.raises(GraphFileError, match="no sense"):
-        load_actions(path, "mine", graph, sight.table)
+        load_actions(path, "mine", graph, model.table)

@@ -36,5 +36,5 @@ def test_each_world_is_played_in_its_own_way(character: Character) -> None:
 
 
 def of_world(graph: MotionGraph, world: str) -> MotionGraph:
-    """The same graph, told to be of another world."""
+    """The same graph, as one of another world."""
     return dataclasses.replace(graph, database=dataclasses.replace(graph.database, world=world))

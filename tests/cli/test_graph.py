@@ -41,7 +41,7 @@ class TestBuild:
         assert dynresp("graph", "build", "builtin", "--out", again).exit_code == 0
         assert again.read_bytes() == graph.read_bytes()
 
-    def test_an_unknown_plan(self, dynresp: Command, tmp_path: Path) -> None:
+    def test_an_unknown_spec(self, dynresp: Command, tmp_path: Path) -> None:
         result = dynresp("graph", "build", "biltin", "--out", tmp_path / "graph.npz")
         assert result.exit_code == 2
         assert "Did you mean 'builtin'?" in result.stderr
@@ -53,16 +53,16 @@ class TestBuild:
         assert not (tmp_path / "graph.npz").exists()
 
     @pytest.mark.mocap
-    def test_a_plan_of_the_users_own(
+    def test_a_spec_of_the_users_own(
         self, dynresp: Command, tmp_path: Path, motions_folder: Path
     ) -> None:
-        plan = tmp_path / "plan.toml"
-        plan.write_text(
+        spec = tmp_path / "spec.toml"
+        spec.write_text(
             '[graph]\nname = "mine"\nfps = 30\n\n[[motion]]\n'
             'motion = "snumrl_DataDrivenBipedController/*stright.bvh"\ntrim_t_pose = true\n'
         )
         out = tmp_path / "graph.npz"
-        result = dynresp("graph", "build", plan, "--out", out, "--motions", motions_folder)
+        result = dynresp("graph", "build", spec, "--out", out, "--motions", motions_folder)
         assert result.exit_code == 0, result.stderr
         assert "frames at 30 fps" in result.stdout
         assert "Movement Research Lab" in result.stdout
@@ -127,8 +127,8 @@ class TestSketch:
         content = json.loads(by_file.stdout)
         assert content["sketch"]["arrived"]
         assert content["sketch"]["off_path_mean_m"] < 0.3
-        by_words = dynresp(*words, tmp_path / "b", "--points", "0,0 4,0 6,3")
-        assert json.loads(by_words.stdout) == content
+        by_points = dynresp(*words, tmp_path / "b", "--points", "0,0 4,0 6,3")
+        assert json.loads(by_points.stdout) == content
 
     def test_around_a_box(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
         world = tmp_path / "world.toml"
@@ -155,14 +155,14 @@ class TestSketch:
         content = json.loads(result.stdout)["sketch"]
         # The wall stands 1.6 m before the corner.
         assert content["off_sketch_worst_m"] > 1.6 > content["off_path_worst_m"]
-        said = "the walk misses a corner of the path by"
+        message = "the walk misses a corner of the path by"
         assert (
-            f"{said} {content['off_sketch_worst_m']:.1f} m; obstacles are in the way"
+            f"{message} {content['off_sketch_worst_m']:.1f} m; obstacles are in the way"
             in " ".join(result.stderr.split())
         )
 
     @pytest.mark.parametrize(
-        ("words", "said"),
+        ("words", "message"),
         [
             ((), "give either a path (--points or --path) or a goal (--goal), got none"),
             (("--points", "0,0 1"), "--points: expected x,y in metres, got '1'"),
@@ -182,15 +182,15 @@ class TestSketch:
         graph: Path,
         tmp_path: Path,
         words: tuple[str, ...],
-        said: str,
+        message: str,
     ) -> None:
         result = dynresp("graph", "sketch", graph, "--out", tmp_path / "out", *words)
         assert result.exit_code == 2, result.output
-        assert said in result.stderr
+        assert message in result.stderr
         assert "Traceback" not in result.stderr
 
     @pytest.mark.parametrize(
-        ("content", "said"),
+        ("content", "message"),
         [
             # The limit of 1 MiB lies inside a character.
             (b"#" + 2**20 * "é".encode(), "is larger than 1024 KiB"),
@@ -201,21 +201,21 @@ class TestSketch:
         ],
     )
     def test_files_that_hold_no_path(
-        self, dynresp: Command, graph: Path, tmp_path: Path, content: bytes, said: str
+        self, dynresp: Command, graph: Path, tmp_path: Path, content: bytes, message: str
     ) -> None:
         path = tmp_path / "path.csv"
         path.write_bytes(content)
         result = dynresp("graph", "sketch", graph, "--out", tmp_path / "out", "--path", path)
         assert result.exit_code == 2, result.output
-        assert said in " ".join(result.stderr.split())
+        assert message in " ".join(result.stderr.split())
         assert len(result.stderr) < 1000
 
 
 @pytest.mark.mocap
-@pytest.mark.parametrize("plan", ["terrain", "playground"])
-def test_recorded_worlds(dynresp: Command, tmp_path: Path, motions_folder: Path, plan: str) -> None:
+@pytest.mark.parametrize("spec", ["terrain", "playground"])
+def test_recorded_worlds(dynresp: Command, tmp_path: Path, motions_folder: Path, spec: str) -> None:
     graph = tmp_path / "graph.npz"
-    built = dynresp("graph", "build", plan, "--out", graph, "--motions", motions_folder)
+    built = dynresp("graph", "build", spec, "--out", graph, "--motions", motions_folder)
     assert built.exit_code == 0, built.stderr
     assert "mocap.cs.cmu.edu" in built.stdout
     walked = dynresp(

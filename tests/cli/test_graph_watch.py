@@ -28,7 +28,7 @@ from .conftest import Command
 FILES = {
     "motion.npz", "motion.bvh", "recording.html", "filmstrip.png", "plan.png", "watching.png",
 }  # fmt: skip
-PLAN = """
+SPEC = """
 [graph]
 name = "some steps"
 
@@ -58,8 +58,8 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small graph of built-in motion."""
     folder = tmp_path_factory.mktemp("graph")
-    (folder / "plan.toml").write_text(PLAN)
-    words = ["graph", "build", str(folder / "plan.toml"), "--out", str(folder / "graph.npz")]
+    (folder / "spec.toml").write_text(SPEC)
+    words = ["graph", "build", str(folder / "spec.toml"), "--out", str(folder / "graph.npz")]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     return folder / "graph.npz"
@@ -67,7 +67,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> list[np.ndarray]:
-    """Somebody who stands about, and goes backwards."""
+    """A person who stands, and walks backwards."""
     somebody = SOMEBODY.character(tmp_path_factory.mktemp("somebody"))
     motion = load_builtin("footwork", somebody)
     part = slice(round(12.5 * motion.fps), round(16.0 * motion.fps))
@@ -115,7 +115,7 @@ class TestFile:
         assert motion.fps == 30.0
         assert motion.duration == pytest.approx(4.5, abs=0.11)
 
-    def test_what_was_learnt_is_kept(
+    def test_the_second_run_reads_what_the_first_learnt(
         self,
         dynresp: Command,
         graph: Path,
@@ -136,7 +136,7 @@ class TestFile:
         assert printed["pace"]["choices_per_s"] > 0.0
         assert made == {path: path.stat().st_mtime_ns for path in (cache / "sight").iterdir()}
 
-    def test_kept_files_that_are_damaged_are_made_anew(
+    def test_damaged_files_are_made_again(
         self,
         dynresp: Command,
         graph: Path,
@@ -181,9 +181,9 @@ class TestFile:
 
 
 class TestRefused:
-    def test_what_is_no_video(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
+    def test_wrong_sources_are_refused(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
         (tmp_path / "text.mp4").write_text("no video at all")
-        for source, said in (
+        for source, message in (
             (tmp_path / "none.mp4", "no such file"),
             (tmp_path, "is a folder"),
             (tmp_path / "text.mp4", "cannot be opened; expected a video"),
@@ -192,7 +192,7 @@ class TestRefused:
         ):
             result = dynresp("graph", "watch", graph, source, "--out", tmp_path / "out")
             assert result.exit_code == 2, result.output
-            assert said in result.stderr
+            assert message in result.stderr
             assert "drawing silhouettes" not in result.stderr
         assert not (tmp_path / "out").exists()
 
@@ -229,7 +229,7 @@ class TestRefused:
         assert result.exit_code == 2, result.output
         assert "8208 x 16 pixels; at most 8192" in result.stderr
 
-    def test_a_video_that_says_no_rate(
+    def test_a_video_without_a_frame_rate(
         self,
         dynresp: Command,
         graph: Path,
@@ -269,7 +269,7 @@ class TestRefused:
 
 
 class Camera:
-    """Stands for one that OpenCV reads: pictures in their time, and then it is unplugged."""
+    """A camera for OpenCV that delivers pictures in their time, and then is unplugged."""
 
     def __init__(
         self, pictures: list[np.ndarray], interrupt_at: int | None = None, fps: float = 30.0
@@ -311,7 +311,7 @@ class TestCamera:
     def plugged_in(
         self, monkeypatch: pytest.MonkeyPatch, pictures: list[np.ndarray]
     ) -> dict[str, Camera]:
-        """A camera that shows the room for half a second more, and goes on."""
+        """A camera that shows the empty room for half a second, then the person."""
         there = {"camera": Camera([pictures[0]] * 15 + pictures)}
         monkeypatch.setattr(cv2, "VideoCapture", lambda source: there["camera"])
         monkeypatch.setattr(graph_watch, "_STEP_OUT_S", 0.4)
@@ -328,7 +328,7 @@ class TestCamera:
         assert content["video"]["name"] == "camera 0"
         assert content["happened"]["seconds"] == pytest.approx(3.0, abs=0.11)
 
-    def test_ctrl_c_ends_it_and_what_came_is_written(
+    def test_ctrl_c_ends_it_and_writes_the_result(
         self,
         dynresp: Command,
         graph: Path,
@@ -363,7 +363,7 @@ class TestCamera:
 def test_a_stranger_among_recorded_motions(
     dynresp: Command, tmp_path: Path, motions_folder: Path
 ) -> None:
-    plan = tmp_path / "plan.toml"
+    spec = tmp_path / "spec.toml"
     folder = "snumrl_ys2010"
     clips = (
         f"{folder}/VideoMotion/wd2_freeWalk_01.bvh",
@@ -372,9 +372,9 @@ def test_a_stranger_among_recorded_motions(
         f"{folder}/samsung_boxing/boxman/boxing_boxman_stand_dir_onetwo.bvh",
     )
     motions = [f'[[motion]]\nmotion = "{clip}"\ntrim_t_pose = true\n' for clip in clips]
-    plan.write_text('[graph]\nname = "mine"\n\n' + "\n".join(motions))
+    spec.write_text('[graph]\nname = "mine"\n\n' + "\n".join(motions))
     graph = tmp_path / "graph.npz"
-    built = dynresp("graph", "build", plan, "--out", graph, "--motions", motions_folder)
+    built = dynresp("graph", "build", spec, "--out", graph, "--motions", motions_folder)
     assert built.exit_code == 0, built.stderr
     stranger = Body(1.92, 1.03, 0.97, 1.3).character(tmp_path)
     boxing = load_motion(motions_folder / "cmu/02/02_05.amc", stranger)
@@ -388,6 +388,6 @@ def test_a_stranger_among_recorded_motions(
     # A boxer does not get ahead.
     still = ("stays in place", "goes to and fro")
     on_the_spot = {a["name"] for a in content["actions"] if a["what"].startswith(still)}
-    told = [part for part in content["person"] if part["to_s"] > 2.0]
-    right = [p["to_s"] - max(p["from_s"], 2.0) for p in told if p["action"] in on_the_spot]
-    assert sum(right) > 0.8 * (told[-1]["to_s"] - 2.0)
+    shown = [part for part in content["person"] if part["to_s"] > 2.0]
+    right = [p["to_s"] - max(p["from_s"], 2.0) for p in shown if p["action"] in on_the_spot]
+    assert sum(right) > 0.8 * (shown[-1]["to_s"] - 2.0)

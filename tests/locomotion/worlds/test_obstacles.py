@@ -48,7 +48,7 @@ def test_collisions_equal_the_slow_twin(rng: np.random.Generator) -> None:
         found = CollisionGrid.of(world, 1.2).collisions(roots, feet, margin)
         assert found.dtype == bool
         for root, reach, hit in zip(roots, feet, found, strict=True):
-            # What is off the world's ground collides without a look.
+            # Outside of the bounds everything collides.
             inside = BOUNDS[0] <= root[0] <= BOUNDS[2] and BOUNDS[1] <= root[1] <= BOUNDS[3]
             assert hit == (not inside or oracle.collides(world, *root, reach, margin))
         hits += int(found.sum())
@@ -65,7 +65,7 @@ def test_footprints_are_where_mujoco_puts_the_geoms(
         np.testing.assert_allclose(reach, oracle.footprint(character, pose), atol=1e-9)
 
 
-def test_who_stands_covers_half_a_metre_by_a_third(character: Character) -> None:
+def test_a_standing_body_covers_half_a_metre_by_a_third(character: Character) -> None:
     back, front, right, left = footprints(character, character.rest_pose)[0]
     assert front - back == pytest.approx(0.30, abs=0.05)
     assert left == pytest.approx(-right, abs=1e-9)
@@ -102,7 +102,7 @@ def test_no_body_touches_a_box_that_its_footprint_leaves_alone(
     assert (away[~hits] > -mujoco.mjMINVAL).all()
 
 
-def test_what_is_no_world() -> None:
+def test_wrong_numbers_are_refused() -> None:
     for box in (((0, math.nan), (1, 1)), ((0, 0), (0, 1)), ((0, 0), (1, math.inf))):
         with pytest.raises(UsageError, match="of an obstacle must be 2 finite numbers"):
             Obstacle(*box)
@@ -113,7 +113,7 @@ def test_what_is_no_world() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["ab", None, 3.0, (1.0,), (1.0, "x"), [(1.0, 2.0)], (1, 2, 3)])
-def test_what_is_no_box_and_no_bounds(wrong: object) -> None:
+def test_wrong_types_are_refused(wrong: object) -> None:
     with pytest.raises(UsageError, match="center of an obstacle must be 2 finite numbers, got"):
         Obstacle(wrong, (1.0, 1.0))  # type: ignore[arg-type]
     with pytest.raises(
@@ -142,7 +142,7 @@ def test_a_world_must_not_have_too_many_boxes_or_too_large_ones() -> None:
     assert len(World(bounds, (small,) * 10_000).boxes) == 10_004
     with pytest.raises(UsageError, match=r"at most 10000 boxes, got 10001; leave out"):
         World(bounds, (small,) * 10_001)
-    # Of a box only what lies within the bounds counts.
+    # Only the part of a box inside the bounds counts.
     World(bounds, (Obstacle((0, 0), (1e200, 1e200), 0.3),) * 25)
     with pytest.raises(UsageError, match=r"26 boxes are too large .* adds up to 1040000 m2"):
         World(bounds, (Obstacle((0, 0), (1e200, 1e200), 0.3),) * 26)
@@ -161,7 +161,7 @@ def test_grids_must_not_be_too_fine() -> None:
         world.grid_shape(0.0)
 
 
-def test_a_grid_says_how_far_boxes_are_as_the_world_does(rng: np.random.Generator) -> None:
+def test_distances_of_a_grid_equal_those_of_its_world(rng: np.random.Generator) -> None:
     for reach in (0.3, 1.2, 20.0):
         world = made_world(rng)
         grid = CollisionGrid.of(world, reach, cell_m=0.17)
@@ -174,7 +174,7 @@ def test_a_grid_says_how_far_boxes_are_as_the_world_does(rng: np.random.Generato
 
 
 def test_lists_of_boxes_must_not_be_too_long() -> None:
-    # Every box is near to every cell.
+    # Every box is near every cell.
     world = World((0.0, 0.0, 40.0, 40.0), (Obstacle((20, 20), (40, 40)),) * 600)
     with pytest.raises(UsageError, match=r"boxes within reach \(1.2 m\) .* leave out"):
         CollisionGrid.of(world, 1.2, cell_m=0.05)

@@ -23,7 +23,7 @@ def test_distances_to_a_path() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["abc", None, 3.0, [[1.0, 2.0, 3.0]], [[1.0, 2.0], [3.0]], []])
-def test_what_is_no_path(wrong: object) -> None:
+def test_wrong_paths_are_refused(wrong: object) -> None:
     with pytest.raises(UsageError, match=r"a sketch must be points \(k, 2\), got"):
         as_path(wrong, "a sketch")  # type: ignore[arg-type]
 
@@ -37,26 +37,26 @@ def test_a_path_is_finite_and_not_too_long() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["abc", None, 3.0, (1.0,), (1.0, np.nan), [(1.0, 2.0)], {}])
-def test_what_is_no_place(wrong: object) -> None:
+def test_wrong_points_are_refused(wrong: object) -> None:
     with pytest.raises(UsageError, match=r"a goal must be two finite numbers, x and y \[m\], got"):
         as_point(wrong, "a goal")  # type: ignore[arg-type]
 
 
-def test_what_is_done_of_a_path_never_becomes_less() -> None:
+def test_progress_never_decreases() -> None:
     path = resampled([(0.0, 0.0), (2.0, 0.0), (0.0, 0.0), (2.0, 0.0)], 0.1)
-    done, told = 0.0, []
+    done, progress = 0.0, []
     for x in [*np.arange(0.0, 2.0, 0.07), *np.arange(2.0, 0.0, -0.07), *np.arange(0.0, 2.0, 0.07)]:
         done, away = _nearest_on(path, x, 0.0, done, 4)
         assert away < 0.07
-        told.append(done)
-    assert (np.diff(told) >= 0.0).all()
-    assert told[-1] == pytest.approx(59.5, abs=0.6)
-    # Who stands still stays where he is, and who goes back is as far away as he has gone.
+        progress.append(done)
+    assert (np.diff(progress) >= 0.0).all()
+    assert progress[-1] == pytest.approx(59.5, abs=0.6)
+    # Standing still and going back keep the progress; going back adds distance.
     assert _nearest_on(path, 1.0, 0.0, 10.0, 4) == (10.0, 0.0)
     assert _nearest_on(path, 0.5, 0.0, 10.0, 4) == pytest.approx((10.0, 0.5))
 
 
-def test_the_nearest_point_of_a_path_is_looked_for_ahead(rng: np.random.Generator) -> None:
+def test_the_nearest_point_is_searched_ahead(rng: np.random.Generator) -> None:
     path = np.cumsum(rng.normal(0.0, 0.1, (30, 2)), axis=0)
     for _ in range(200):
         point, done = rng.normal(0.0, 0.4, 2), rng.uniform(0.0, 29.0)
@@ -67,12 +67,12 @@ def test_the_nearest_point_of_a_path_is_looked_for_ahead(rng: np.random.Generato
         assert away == pytest.approx(np.hypot(*(places - point).T).min(), abs=1e-3)
 
 
-def test_a_path_of_one_point_and_points_that_are_alike() -> None:
+def test_a_path_of_one_point_and_one_of_equal_points() -> None:
     assert _nearest_on(np.array([(1.0, 1.0)]), 1.0, 3.0, 0.0, 4) == (0.0, 2.0)
     assert _nearest_on(np.array([(1.0, 1.0), (1.0, 1.0)]), 1.0, 3.0, 0.0, 4) == (1.0, 2.0)
 
 
-def test_at_low_rates_one_looks_farther_ahead() -> None:
+def test_at_low_rates_the_window_is_longer() -> None:
     assert window_m(15.0) == pytest.approx(0.4)
     assert window_m(60.0) == pytest.approx(0.4)
     assert window_m(5.0) == pytest.approx(1.2)

@@ -39,7 +39,7 @@ def test_the_nearest_bar(rng: np.random.Generator) -> None:
         assert d == pytest.approx(min(away), abs=1e-3)
 
 
-def test_bars_that_make_no_sense_are_refused() -> None:
+def test_wrong_bars_are_refused() -> None:
     bar = Bar("bar", (0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
     with pytest.raises(UsageError, match="different name"):
         Playground((bar, bar))
@@ -67,7 +67,7 @@ def test_hands_hold_the_bar_that_they_hang_from(character: Character) -> None:
     contacts = playground_contacts(Motion(poses, FPS), character, high)
     assert contacts.shape == (30, 4)
     assert (contacts == (False, False, True, True)).all()
-    # A bar that is too short for the right hand, and one that flies past.
+    # A bar that is too short for the right hand, and one that the body falls past.
     short = Playground((Bar("short", tuple(left), tuple(left + aside)),))
     contacts = playground_contacts(Motion(poses, FPS), character, short)
     assert (contacts == (False, False, True, False)).all()
@@ -91,7 +91,7 @@ def test_feet_stand_on_rungs_and_on_the_ground(character: Character) -> None:
 
 @pytest.mark.slow
 @pytest.mark.mocap
-def test_whoever_is_off_the_ground_holds_on(motions_folder: Path, character: Character) -> None:
+def test_a_body_off_the_ground_holds_on(motions_folder: Path, character: Character) -> None:
     files = sorted((motions_folder / "cmu" / "01").glob("*.amc"))
     up = held = 0
     grips: dict[str, set[str]] = {}

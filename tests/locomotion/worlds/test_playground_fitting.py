@@ -31,7 +31,7 @@ FIXED = GraphConfig(coordinates=Coordinates.FIXED, contact_change=False, sigma=1
 
 
 def hanging(character: Character, seed: int, aside: float, lift: float = 0.0) -> FloatArray:
-    """Poses (90, 59) of one who hangs by bent arms and sways, somewhat aside, then lets go."""
+    """Poses (90, 59) of a body that hangs by bent arms and sways, shifted aside, then lets go."""
     rng = np.random.default_rng(seed)
     at = np.arange(90) / FPS
     poses = np.repeat(character.rest_pose[None], len(at), axis=0)
@@ -55,7 +55,7 @@ def bars(character: Character) -> Playground:
 
 @pytest.fixture(scope="module")
 def graph(character: Character, bars: Playground) -> MotionGraph:
-    """Two who hang 12 cm apart; from one to the other a hand that holds must slip, as played."""
+    """Two clips that hang 12 cm apart: in a jump between them a hand slips unless it is fitted."""
     motions = [
         Motion(hanging(character, seed, 0.12 * seed), FPS, f"hanging {seed}") for seed in range(2)
     ]
@@ -88,7 +88,7 @@ def test_a_hand_that_holds_stays_where_it_holds(
     assert tight.slip.max() < 0.002
     reach = GRIP_M + bars.bars[0].radius
     assert tight.off_bar.max() < reach + 1e-3
-    # The held point of the hand is at the held point of the bar, at once and to the end.
+    # The held point of the hand is at the held point of the bar in every frame.
     states = character.kinematics(fitted.motion.poses)
     for hold in holds:
         forearm = character.body(f"{('left', 'right')[hold.hand]}_forearm")
@@ -99,13 +99,13 @@ def test_a_hand_that_holds_stays_where_it_holds(
         assert np.abs(there - hold.place).max() < 1e-3
         assert bars.bars[hold.bar].distance(hold.place) < 1e-9
     assert (fitted.unfitted == played.unfitted).all()
-    # Nothing leaps where holds begin and end.
+    # No hand leaps where holds begin and end.
     before = character.kinematics(played.motion.poses)
     was, now = (np.abs(np.diff(palms(character, x), axis=0)).max() for x in (before, states))
     assert now < was + 0.02
 
 
-def test_where_nothing_slips_little_is_moved(
+def test_little_moves_where_nothing_slips(
     graph: MotionGraph, character: Character, bars: Playground
 ) -> None:
     clip = graph.database.clips[0]
@@ -138,7 +138,7 @@ def test_a_hand_goes_from_bar_to_bar(
     assert grips(character, fitted.motion, holds, two).slip.max() < 0.002
 
 
-def test_what_cannot_be_fitted_is_refused(graph: MotionGraph, character: Character) -> None:
+def test_a_graph_without_hand_contacts_is_refused(graph: MotionGraph, character: Character) -> None:
     feet_alone = MotionGraph.build(
         [Motion(hanging(character, 0, 0.0), FPS, "hanging")], FIXED, character
     )
@@ -170,6 +170,6 @@ def test_hands_of_recorded_climbers_hold_on(motions_folder: Path, character: Cha
         slides = (stance_slides(x.motion, character) for x in (played, fitted))
         before, after = (float(np.sum(x)) for x in slides)
         assert after < before + 0.02
-        # Nothing is bought by haste.
+        # Fitting does not make joints much faster.
         fast = [np.abs(x.motion.velocities()[:, 6:]) for x in (played, fitted)]
         assert np.percentile(fast[1], 99.9) < 1.1 * np.percentile(fast[0], 99.9)

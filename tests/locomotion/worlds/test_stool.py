@@ -73,12 +73,12 @@ def test_contacts_are_found_where_they_were_planned(
 
 def test_nothing_is_in_the_stool(character: Character, motions: list[Motion]) -> None:
     clear = body_clearances(stool_world(), character, motions[0].poses[::3], max_distance=0.05)
-    # Shanks brush over its edges in the long step, and a seat gives.
+    # Shanks touch its edges in the long step, and the body overlaps it a little in sitting.
     assert clear.min() > -0.045
     assert (clear < -0.012).mean() < 0.01
 
 
-def test_all_that_is_told_happens(motions: list[Motion]) -> None:
+def test_all_labelled_actions_happen(motions: list[Motion]) -> None:
     motion = motions[0]
     done = {label.name.removesuffix(" mirrored") for label in motion.labels}
     assert done >= {"step_on", "cross", "return", "step_over", "jump_over", "jump_down", "sit"}
@@ -91,7 +91,7 @@ def test_all_that_is_told_happens(motions: list[Motion]) -> None:
     aloft = ~motion.contacts.any(axis=1)
     assert np.count_nonzero(np.diff(aloft.astype(int)) == 1) == 2  # jumps over it, and down
     assert (aloft & (away < 0.15)).any()
-    # Goes around it both ways: all bearings, more than a half-turn in a go.
+    # It goes around the stool in both directions: all bearings, more than half a turn at once.
     bearing = np.unwrap(np.arctan2(*motion.root_positions[away > 1.0, 1::-1].T))
     assert np.ptp(bearing) > np.pi
     facing = np.unwrap(rotations.yaw_of(motion.root_quaternions))

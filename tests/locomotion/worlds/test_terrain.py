@@ -59,7 +59,7 @@ def test_levels_that_are_no_grid_of_whole_numbers_are_refused(levels: np.ndarray
         Terrain(levels)
 
 
-def test_sizes_that_make_no_sense_are_refused() -> None:
+def test_wrong_sizes_are_refused() -> None:
     with pytest.raises(UsageError, match="block_m must be above 0"):
         Terrain(LEVELS, block_m=0.0)
     with pytest.raises(UsageError, match="corner of a terrain must be 2 finite numbers"):
@@ -69,7 +69,7 @@ def test_sizes_that_make_no_sense_are_refused() -> None:
 
 
 @pytest.mark.parametrize("steepest", [0, 1, 2, 3])
-def test_random_terrain_is_no_steeper_than_asked(steepest: int) -> None:
+def test_random_terrain_is_no_steeper_than_its_limit(steepest: int) -> None:
     terrain = Terrain.random(np.random.default_rng(5), 25, 30, highest=6, steepest=steepest)
     levels = terrain.levels
     shifts = [(1, 0), (0, 1), (1, 1), (1, -1)]
@@ -115,7 +115,7 @@ def _stands(terrain: Terrain, sole: np.ndarray, at: np.ndarray, tolerance: float
     return abs(least) <= tolerance
 
 
-def test_support_is_as_its_slow_twin_says(rng: np.random.Generator) -> None:
+def test_support_equals_its_slow_twin(rng: np.random.Generator) -> None:
     terrain = Terrain.random(rng, 6, 5)
     soles = np.stack(
         [
@@ -235,7 +235,7 @@ def test_motion_is_moved_onto_the_blocks(character: Character, rng: np.random.Ge
     assert other.supports(soles, np.zeros(4), 0.01).all()
 
 
-def test_too_little_motion_tells_no_grid(character: Character, rng: np.random.Generator) -> None:
+def test_too_little_motion_is_refused(character: Character, rng: np.random.Generator) -> None:
     walk = block_walk(character, rng, LEVELS, 3)
     with pytest.raises(MotionError, match="too few"):
         fit_blocks(character, [walk])
@@ -298,5 +298,5 @@ class TestRecorded:
         state = placement.compose(
             graph.placements[jumps], graph.database.planar[graph.targets[jumps] - 1]
         )
-        apart = graph.database.planar[graph.sources[jumps]] - state
-        assert np.linalg.norm(apart[:, :2], axis=1).max() < BLOCK_M
+        offset = graph.database.planar[graph.sources[jumps]] - state
+        assert np.linalg.norm(offset[:, :2], axis=1).max() < BLOCK_M
