@@ -27,7 +27,7 @@ class Judged:
     Attributes:
         truth: (m,) the actor's cluster at that moment.
         recent: (m, K) whether the actor was in each cluster within the last second.
-        chosen: (m,) the cluster to which the chosen way leads.
+        chosen: (m,) the cluster to which the chosen path leads.
         recognised: (m,) the cluster in which the person was most probably seen.
         own: (m,) the cluster that the avatar is in.
         lags: (c,) from an actor's change of cluster until it is chosen [s].

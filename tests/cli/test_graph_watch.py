@@ -213,7 +213,7 @@ class TestRefused:
         words = ("graph", "watch", graph, tmp_path / "room.mp4", "--out", tmp_path / "out")
         result = dynresp(*words)
         assert result.exit_code == 1, result.output
-        assert "nobody is seen in room.mp4" in result.stderr
+        assert "no person is seen in room.mp4" in result.stderr
         assert not (tmp_path / "out" / "result.json").exists()
 
     def test_a_picture_larger_than_any_camera_has(
@@ -227,7 +227,7 @@ class TestRefused:
         words = ("graph", "watch", graph, tmp_path / "wide.avi", "--out", tmp_path / "out")
         result = dynresp(*words)
         assert result.exit_code == 2, result.output
-        assert "8208 x 16 pixels; at most 8192" in result.stderr
+        assert "8208 x 16 pixels; expected at most 8192" in result.stderr
 
     def test_a_video_without_a_frame_rate(
         self,

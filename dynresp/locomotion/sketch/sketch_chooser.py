@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.locomotion.clusters.cluster_forest import ClusterForest
-from dynresp.locomotion.graph import placement
+from dynresp.locomotion.graph.placement import compose, inverse
 from dynresp.locomotion.vision.time_warping import warp_onto_rows
 from dynresp.locomotion.worlds.paths import as_path, check_length, resampled
 from dynresp.motion.character import Character, default_character
@@ -87,12 +87,12 @@ class SketchChooser:
         self._centers[:, :3] = np.einsum("fbc,b->fc", centers, character.masses)
         self._centers[:, :3] /= character.masses.sum()
 
-    def choose(self, frame: int, placed: npt.ArrayLike, sketch: npt.ArrayLike) -> SketchedAction:
+    def choose(self, frame: int, placement: npt.ArrayLike, sketch: npt.ArrayLike) -> SketchedAction:
         """The action that follows a sketch best.
 
         Args:
             frame: The frame that the avatar is at.
-            placed: (4,) placement of its clip.
+            placement: (4,) placement of its clip.
             sketch: (k, 2) corners of a path on the ground that begins at the avatar, at most 1 km
                 long [m].
 
@@ -118,7 +118,7 @@ class SketchChooser:
             motion = forest.likeliest_motion(tree, int(leaf), left_s)
             frames = np.concatenate([lead[:-1], forest.stay(motion.frames, left)])
             motions.append(frames[1:])
-            paths.append(self._path(frames, placed)[1:])
+            paths.append(self._path(frames, placement)[1:])
         kept = [k for k, frames in enumerate(motions) if len(frames)]
         if not kept:
             raise UsageError(
@@ -137,9 +137,9 @@ class SketchChooser:
             actions=len(kept),
         )
 
-    def _path(self, frames: IntArray, placed: npt.ArrayLike) -> FloatArray:
+    def _path(self, frames: IntArray, placement: npt.ArrayLike) -> FloatArray:
         """(s, 2) the centre of mass over the ground while frames play [m]."""
         database = self.forest.graph.database
-        roots = self.forest.root_states_along(frames, placed)
-        clips = placement.compose(roots, placement.inverse(database.planar[frames]))
-        return placement.compose(clips, self._centers[frames])[:, :2]
+        roots = self.forest.root_states_along(frames, placement)
+        clips = compose(roots, inverse(database.planar[frames]))
+        return compose(clips, self._centers[frames])[:, :2]

@@ -9,7 +9,7 @@ from tests.locomotion.vision.samples import acting_forest
 
 @pytest.fixture(scope="session")
 def forest() -> ClusterForest:
-    """Two actions and ways between them."""
+    """Two actions, and jumps between them."""
     return acting_forest(default_character())
 
 
@@ -21,5 +21,5 @@ def table(forest: ClusterForest) -> ViewTable:
 
 @pytest.fixture(scope="session")
 def recogniser(forest: ClusterForest, table: ViewTable) -> Recogniser:
-    """Tells them apart."""
+    """Trained to recognise them."""
     return Recogniser.trained(forest.graph.database, table, forest.clusters.labels)

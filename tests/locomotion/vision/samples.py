@@ -1,4 +1,4 @@
-"""Two actions that anybody tells apart, for tests of control by video."""
+"""Two actions that look very different, for tests of control by video."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ STEPPING, WAVING = 0, 1
 
 
 def stepping(character: Character, frames: int, fps: float = FPS, pace: float = 1.0) -> FloatArray:
-    """Walks about with long steps, arms down: (frames, 59)."""
+    """Long steps to and fro, arms down: (frames, 59)."""
     poses = np.tile(character.rest_pose, (frames, 1))
     swing = 0.6 * np.sin(2 * np.pi * pace * np.arange(frames) / fps)
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -29,7 +29,7 @@ def stepping(character: Character, frames: int, fps: float = FPS, pace: float = 
 
 
 def waving(character: Character, frames: int, fps: float = FPS, pace: float = 1.0) -> FloatArray:
-    """Stands and beats its stretched arms up and down at its sides: (frames, 59)."""
+    """Stands, and swings its stretched arms up and down at its sides: (frames, 59)."""
     poses = np.tile(character.rest_pose, (frames, 1))
     lift = 1.7 + 0.6 * np.sin(2 * np.pi * pace * np.arange(frames) / fps)
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -39,19 +39,19 @@ def waving(character: Character, frames: int, fps: float = FPS, pace: float = 1.
 
 
 def acting_database(character: Character) -> MotionDatabase:
-    """Six seconds of either."""
+    """Six seconds of each action."""
     motions = [Motion(poses(character, 90), FPS, poses.__name__) for poses in (stepping, waving)]
     return MotionDatabase.from_motions(motions, character)
 
 
 def acting_forest(character: Character) -> ClusterForest:
-    """The two clips, circles both, with a way from one to the other every second."""
+    """The two clips as loops, with a jump from one to the other every second."""
     database = acting_database(character)
-    ways = {(i, i + 1) for i in range(179) if i != 89} | {(89, 1), (179, 91)}
-    ways |= {(i, i + 91) for i in range(0, 89, 15)} | {(i, i - 89) for i in range(90, 179, 15)}
-    recorded = [database.successors[i] == j for i, j in sorted(ways)]
-    order = np.lexsort((~np.array(recorded), [i for i, _ in sorted(ways)]))
-    sources, targets = np.array(sorted(ways))[order].T
+    edges = {(i, i + 1) for i in range(179) if i != 89} | {(89, 1), (179, 91)}
+    edges |= {(i, i + 91) for i in range(0, 89, 15)} | {(i, i - 89) for i in range(90, 179, 15)}
+    recorded = [database.successors[i] == j for i, j in sorted(edges)]
+    order = np.lexsort((~np.array(recorded), [i for i, _ in sorted(edges)]))
+    sources, targets = np.array(sorted(edges))[order].T
     offsets = np.concatenate([[0], np.cumsum(np.bincount(sources, minlength=180))])
     distances = np.where(np.array(recorded)[order], 0.0, 0.1).astype(np.float32)
     graph = MotionGraph(

@@ -16,12 +16,12 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
 
 @pytest.mark.parametrize(("seed", "who"), [(1, "02"), (2, "127"), (3, "17")])
 def test_a_person_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> None:
-    somebody = person(who, tmp_path)
+    actor = person(who, tmp_path)
     act = stepping if seed == 1 else waving
-    motion = Motion(act(somebody, 120, 30.0), 30.0)
+    motion = Motion(act(actor, 120, 30.0), 30.0)
     masks: list[np.ndarray] = []
     segmenter = Segmenter(30.0)
-    found = [segmenter.segment(p) for p in film(motion, somebody, Filming(seed), masks)]
+    found = [segmenter.segment(p) for p in film(motion, actor, Filming(seed), masks)]
     assert all(mask is None for mask in found[:30])
     overlaps = [overlap(a > 0, b > 0) for a, b in zip(found[32:], masks[32:], strict=True)]
     assert np.mean(overlaps) > 0.8
@@ -29,12 +29,12 @@ def test_a_person_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> N
 
 
 def test_a_person_who_stands_still_does_not_fade(tmp_path) -> None:
-    somebody = person("16", tmp_path)
-    motion = Motion(np.tile(somebody.rest_pose, (300, 1)), 10.0)
+    actor = person("16", tmp_path)
+    motion = Motion(np.tile(actor.rest_pose, (300, 1)), 10.0)
     masks: list[np.ndarray] = []
     segmenter = Segmenter(10.0)
     filming = Filming(5, fps=10.0)
-    found = [segmenter.segment(p) for p in film(motion, somebody, filming, masks)]
+    found = [segmenter.segment(p) for p in film(motion, actor, filming, masks)]
     assert overlap(found[-1] > 0, masks[-1] > 0) > 0.75
 
 

@@ -6,7 +6,7 @@ from dynresp.locomotion.vision.silhouette_features import FeatureConfig, Shape, 
 from dynresp.support.errors import UsageError
 
 
-def blot(size: int = 240, scale: float = 1.0, angle: float = 0.0, x: float = 0.0) -> np.ndarray:
+def blob(size: int = 240, scale: float = 1.0, angle: float = 0.0, x: float = 0.0) -> np.ndarray:
     corners = scale * np.array([[-40, -60], [30, -50], [10, 0], [40, 70], [-20, 60]], dtype=float)
     cosine, sine = np.cos(angle), np.sin(angle)
     corners = corners @ np.array([[cosine, sine], [-sine, cosine]]) + [size / 2 + x, size / 2]
@@ -14,18 +14,18 @@ def blot(size: int = 240, scale: float = 1.0, angle: float = 0.0, x: float = 0.0
     return cv2.fillPoly(picture, [corners.round().astype(np.int32)], 255)
 
 
-def test_hu_moments_depend_on_neither_place_nor_size_nor_turning() -> None:
-    plain = measure(blot(), Shape.HU)
-    for other in (blot(x=30), blot(scale=0.6), blot(angle=0.7)):
+def test_hu_moments_depend_on_neither_position_nor_size_nor_turning() -> None:
+    plain = measure(blob(), Shape.HU)
+    for other in (blob(x=30), blob(scale=0.6), blob(angle=0.7)):
         np.testing.assert_allclose(measure(other, Shape.HU).shape, plain.shape, atol=0.01)
 
 
-def test_the_grid_depends_on_turning_alone() -> None:
-    plain = measure(blot(), Shape.GRID)
+def test_the_grid_depends_on_turning_only() -> None:
+    plain = measure(blob(), Shape.GRID)
     assert plain.shape.shape == (96,)
-    for other in (blot(x=30), blot(scale=0.6)):
+    for other in (blob(x=30), blob(scale=0.6)):
         assert np.abs(measure(other, Shape.GRID).shape - plain.shape).mean() < 0.03
-    assert np.abs(measure(blot(angle=0.7), Shape.GRID).shape - plain.shape).mean() > 0.08
+    assert np.abs(measure(blob(angle=0.7), Shape.GRID).shape - plain.shape).mean() > 0.08
 
 
 def test_center_and_radius_of_a_disc() -> None:
@@ -36,7 +36,7 @@ def test_center_and_radius_of_a_disc() -> None:
 
 
 @pytest.mark.parametrize("shape", list(Shape))
-def test_what_reaches_beyond_the_picture_or_is_not_there(shape: Shape) -> None:
+def test_silhouettes_beyond_the_picture_and_empty_ones(shape: Shape) -> None:
     corner = np.zeros((50, 40), dtype=np.uint8)
     assert measure(corner, shape) is None
     corner[:1, :1] = 1
@@ -45,7 +45,7 @@ def test_what_reaches_beyond_the_picture_or_is_not_there(shape: Shape) -> None:
     assert np.isfinite(measure(corner, shape).shape).all()
 
 
-def test_speeds_look_back() -> None:
+def test_speeds_are_means_over_the_past() -> None:
     track = np.stack([np.arange(9.0) * 2, np.zeros(9)], axis=1)
     np.testing.assert_allclose(speeds(track, 3, 10.0), [[20.0, 0.0]] * 9)
     jump = np.array([0.0, 0, 0, 0, 6, 6, 6, 6, 6])
@@ -56,6 +56,6 @@ def test_speeds_look_back() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"components": 0}, {"span_s": 0.0}, {"distance_m": np.inf}, {"shape_weight": -1.0}]
 )
-def test_settings_that_make_no_sense(wrong: dict) -> None:
+def test_settings_out_of_range_are_refused(wrong: dict) -> None:
     with pytest.raises(UsageError, match=next(iter(wrong))):
         FeatureConfig(**wrong)

@@ -21,8 +21,9 @@ def test_a_silhouette_has_the_row_of_its_frame(forest, table) -> None:
         np.testing.assert_allclose(row[:-3], expected[:-3], atol=2e-3)
 
 
-def test_somebody_who_goes_left_goes_right_from_the_other_side(forest, table) -> None:
-    # Viewpoint 0 looks along +X, in which the steps lead; 4 and 5 look across, 13 and 14 back.
+def test_a_person_who_goes_left_goes_right_from_the_other_side(forest, table) -> None:
+    # The steps go along X, and viewpoint 0 looks along +X; 4 and 5 look across, 13 and 14 from the
+    # other side.
     speed = table.rows[:90, :, -3]
     standing = table.rows[170, 0, -3]
     moving = np.abs(speed[:, 4] - standing) > 0.5
@@ -32,7 +33,7 @@ def test_somebody_who_goes_left_goes_right_from_the_other_side(forest, table) ->
     assert np.abs(speed[:, 0] - standing).max() < 0.5 * np.abs(speed[:, 4] - standing).max()
 
 
-def test_what_was_written_is_read(forest, table, tmp_path) -> None:
+def test_a_table_is_read_as_it_was_written(forest, table, tmp_path) -> None:
     database = forest.graph.database
     table.save(tmp_path / "views.npz")
     again = ViewTable.load(tmp_path / "views.npz", database)
@@ -44,7 +45,7 @@ def test_what_was_written_is_read(forest, table, tmp_path) -> None:
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "views.npz").read_bytes()
 
 
-def test_tables_of_others_and_damaged_files_are_refused(table, tmp_path, rng) -> None:
+def test_other_tables_and_damaged_files_are_refused(table, tmp_path, rng) -> None:
     path = tmp_path / "views.npz"
     table.save(path)
     with pytest.raises(GraphFileError, match="another graph"):

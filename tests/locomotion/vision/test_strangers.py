@@ -1,4 +1,4 @@
-"""Videos of people who are not in the database: other bodies, other styles."""
+"""Videos of people that the database does not hold: other bodies, other styles."""
 
 from dataclasses import replace
 

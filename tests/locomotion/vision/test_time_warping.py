@@ -15,12 +15,12 @@ def rows(width: int) -> st.SearchStrategy[np.ndarray]:
 
 
 @given(first=rows(2), candidates=st.lists(rows(2), max_size=4), open_end=st.booleans())
-def test_it_is_the_least_sum_over_all_ways_of_matching(first, candidates, open_end):
+def test_it_is_the_least_sum_over_all_matchings(first, candidates, open_end):
     warped = warp_onto(first, candidates, open_end)
     expected = [oracle.warp(first, c, open_end) for c in candidates]
     np.testing.assert_allclose(warped.costs, [cost for cost, _ in expected], atol=1e-12)
     for k, (cost, stop) in enumerate(expected):
-        # Equal costs but for rounding may end elsewhere.
+        # With rounding, another stop may have the same cost.
         if warped.stops[k] != stop:
             assert oracle.warp(first, candidates[k][: warped.stops[k]], False)[0] == pytest.approx(
                 cost, abs=1e-12

@@ -19,7 +19,7 @@ def test_a_file_is_read(codec, ending, tmp_path) -> None:
     assert read[9].mean() == pytest.approx(180.0, abs=6.0)
 
 
-def test_what_cannot_be_read_is_said(tmp_path) -> None:
+def test_what_cannot_be_read_is_refused(tmp_path) -> None:
     with pytest.raises(MotionFileError, match="no such file"):
         Video(tmp_path / "none.mp4")
     with pytest.raises(MotionFileError, match="is a folder"):
@@ -43,6 +43,8 @@ def test_a_name_that_is_not_utf_8(tmp_path) -> None:
         path.write_bytes(b"RIFF")
     except (OSError, UnicodeEncodeError):
         pytest.skip("file names are UTF-8 here")
-    with pytest.raises(MotionFileError, match=r"udcff\.avi: the name is not UTF-8; rename") as told:
+    with pytest.raises(
+        MotionFileError, match=r"udcff\.avi: the name is not UTF-8; rename"
+    ) as error:
         Video(path)
-    str(told.value).encode()
+    str(error.value).encode()

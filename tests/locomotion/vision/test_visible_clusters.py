@@ -43,7 +43,7 @@ def test_a_cluster_without_frames_is_dropped(forest, monkeypatch: pytest.MonkeyP
     np.testing.assert_allclose(clusters.mixture.weights, plain.mixture.weights)
 
 
-def test_neither_position_nor_facing_nor_the_twist_of_a_straight_arm_counts(character) -> None:
+def test_position_facing_and_the_twist_of_a_straight_arm_do_not_count(character) -> None:
     poses = stepping(character, 60)
     plain = visible_observations(
         MotionDatabase.from_motions([Motion(poses, 15.0)], character), character
@@ -57,11 +57,11 @@ def test_neither_position_nor_facing_nor_the_twist_of_a_straight_arm_counts(char
     np.testing.assert_allclose(visible_observations(other, character), plain, atol=1e-9)
 
 
-def test_speeds_are_those_of_the_person(character) -> None:
+def test_the_persons_speed_is_observed(character) -> None:
     poses = np.tile(character.rest_pose, (60, 1))
     poses[:, 1] += 1.2 * np.arange(60) / 15.0
     seen = visible_observations(
         MotionDatabase.from_motions([Motion(poses, 15.0)], character), character
     )
-    # 1.2 m/s to the left, of which each counts 0.7.
+    # 1.2 m/s to the left, with a weight of 0.7.
     np.testing.assert_allclose(seen[:, -3:], [[0.0, 0.84, 0.0]] * 60, atol=1e-9)

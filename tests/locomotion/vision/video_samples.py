@@ -1,4 +1,4 @@
-"""Bodies of people who are filmed in tests."""
+"""Bodies of people that are filmed in tests."""
 
 from pathlib import Path
 
@@ -7,6 +7,6 @@ from studies.video.people import PEOPLE
 
 
 def person(name: str, folder: Path) -> Character:
-    """The character of a person's shape."""
-    bodies = {somebody.name: somebody.body for somebody in PEOPLE}
+    """The character with a person's shape."""
+    bodies = {known.name: known.body for known in PEOPLE}
     return bodies[name].character(folder)
