@@ -1,19 +1,18 @@
-"""The answer to a hit, in the order in which its parts are used.
+"""From a hit to its response, in the order of the steps.
 
-=====================================  ===========================================================
-`hits`, `look_ahead`                   hits are simulated until a choice can be made
-`windows`, `window_config`, `oracle`   the window error, and the exhaustive search by it
-`features`, `prediction`               what is told of a hit, and what is predicted from that
-`classifier`, `classifier_file`        a trained model, and its file
-`alignment`                            when to leave the simulation, and where to enter a reaction
-`carry_on`                             how well the base motion fits, to go on with it
-`oracle_choice`, `classifier_choice`   who chooses; `budget` says which, `choice` is what comes out
-`transition`, `finish`                 servo targets and blend, and the motion after the exit
-`respond`, `response`                  hits answered in bulk
-`crowd`, `dynamic`, `plan`             characters at run time, frame by frame
-`labelling`                            hits as a classifier learns from them
-`quality`, `surface`                   how good a response is, and the landscape of its alignment
-=====================================  ===========================================================
+===================  ==============================================================================
+`hit_simulation`     simulates hits in batches
+`look_ahead`         what the simulations show after contact, from which the choice is made
+`windows`            the mismatch (window error) of short pieces of motion
+`search`             full search (oracle), no reaction (carry on), and labels for training
+`prediction`         the classifier: features, file, prediction
+`choice`             the result of a choice; `budget` and `chooser` decide who chooses
+`alignment`          exit and entry of one reaction
+`transition`         servo targets, the blend, and the motion after it
+`responder`          all steps for many hits; `response` is the result, `response_settings` the spec
+`runtime`            characters at run time, frame by frame
+`response_quality`   quality metrics of a response
+===================  ==============================================================================
 
-`*_kernel` are the compiled inner loops of their namesakes.
+`*_kernel` are compiled inner loops.
 """

@@ -1,4 +1,4 @@
-"""How much is spent on a choice."""
+"""Budgets: how much time a choice may take, and who chooses."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from dynresp.support.errors import UsageError
 
 Budget: TypeAlias = Literal["fast", "better", "best"]
 BUDGETS: tuple[str, ...] = get_args(Budget)
-"""What the classifier takes to be best is aligned; the best two of what it predicts are aligned,
-and the better one is taken; the oracle searches everything."""
+"""fast: align the classifier's first choice; better: align its two best and take the better one;
+best: make the full search."""
 
 _ALIGNED = {"fast": 1, "better": 2}
 
@@ -28,14 +28,14 @@ def chooser_for(
     config: ResponseConfig,
     classifier: Classifier | None = None,
 ) -> Chooser:
-    """What chooses with a budget.
+    """Make what chooses with a budget.
 
     Args:
         budget: One of `BUDGETS`.
         character: The character.
         library: Its reactions.
-        config: Settings.
-        classifier: Trained for them; "best" needs none.
+        config: Settings of the responses.
+        classifier: Trained for this character and library; "best" needs none.
 
     Raises:
         UsageError: There is no such budget, or it needs a classifier.
@@ -48,6 +48,6 @@ def chooser_for(
         return FullSearchChooser(character, library, config)
     if classifier is None:
         raise UsageError(
-            f"the budget {budget!r} needs a trained classifier; give one, or take the budget 'best'"
+            f"the budget {budget!r} needs a trained classifier; give one, or use the budget 'best'"
         )
     return ClassifierChooser(character, library, config, classifier, best=_ALIGNED[budget])

@@ -1,4 +1,4 @@
-"""What was decided for one hit: how it goes on, from when and from where."""
+"""A choice for one hit (reaction, exit, entry), and what every chooser must offer."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from dynresp.response.response import ResponseConfig
 
 @dataclass(frozen=True)
 class Choice:
-    """A reaction, or to carry on with the base motion, and its timing.
+    """A reaction, or no reaction (carry on), with exit and entry.
 
     Attributes:
         name: Name of the reaction, or `CARRY_ON`.
-        motion: Its clip, or the base motion; read between its frames where there is an offset.
-        exit: Frame after contact at which the simulation is left.
-        entry: Frame of the motion that is entered.
-        offset: How much later than in the clip the motion's frames are, a part of a frame.
-        error: Window error there [m].
-        errors: Window error [m] of everything that was aligned, by name.
+        motion: Its clip, or the base motion; with an offset, sampled between the clip's frames.
+        exit: Frame after contact.
+        entry: Frame of the motion.
+        error: Mismatch (window error) there [m].
+        errors: Mismatch [m] of everything that was compared, by name.
+        offset: How much later the motion was sampled than the clip's frames, 0 to 1 frame.
     """
 
     name: str
@@ -36,12 +36,12 @@ class Choice:
 
 
 class Chooser(Protocol):
-    """What decides how hits go on.
+    """Chooses a reaction for each hit.
 
     Attributes:
-        character: Whom it chooses for.
-        library: What it chooses from.
-        config: Settings; those of whoever simulates the hits are the same.
+        character: The character that is hit.
+        library: The reactions.
+        config: Settings; the hits must be simulated with the same.
     """
 
     character: Character

@@ -1,4 +1,4 @@
-"""`[choice]`: the budget and the classifier, and the chooser made of them."""
+"""`[choice]` of a spec: budget and classifier, and the chooser that they give."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class NamedChooser:
 
     Attributes:
         chooser: The chooser.
-        record: What `result.json` says of it under `choosing`.
+        record: What `result.json` says about it under `choosing`.
     """
 
     chooser: Chooser
@@ -53,7 +53,7 @@ def make_chooser(
 ) -> NamedChooser:
     """Make the chooser of a spec.
 
-    Without a classifier for the library it is the full search (oracle).
+    If there is no classifier for the library, it is the full search (oracle).
 
     Args:
         table: The experiment's `[choice]`.
@@ -96,7 +96,7 @@ def make_chooser(
 def find_classifier(
     library: ReactionLibrary, character: Character, named: Path | None = None
 ) -> Classifier | None:
-    """The classifier for a library: the one given, else the user's own, else the shipped one.
+    """Find the classifier for a library: the one given, else the user's own, else the shipped one.
 
     Args:
         library: The reactions.

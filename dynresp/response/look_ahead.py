@@ -1,4 +1,4 @@
-"""What simulations show of hits from contact on, as arrays over many hits."""
+"""Look-ahead: simulations of many hits from contact on, as arrays from which a choice is made."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ class LookAhead:
     """Hits that were simulated for equally long after contact.
 
     Attributes:
-        rows: (hits,) which of the traces they are: those with a contact that did not diverge.
-        bases: The base motion of each.
+        rows: (hits,) indices of the traces: those that have a contact and did not diverge.
+        bases: The base motion of each hit.
         contacts: (hits,) first frame at or after contact, counted in the base motion.
         poses: (hits, frames, 59) from that frame on.
         velocities: (hits, frames, 45) likewise, rows of `qvel`.
-        states: Their bodies, arrays (hits, frames, bodies, ...).
-        speed_changes: (hits,) what each hit did to the speed of the centre of mass over the ground
-            [m/s]: the difference of the simulation's and the base motion's mean velocities over
-            0.1 s from contact on; after a push that lasts, over the last 0.1 s of it that the
-            search can see.
-        grazes: (hits,) whether that is so little that the base motion is carried on.
+        states: Body states, arrays (hits, frames, bodies, ...).
+        speed_changes: (hits,) change of the centre of mass's speed over the ground [m/s]: the
+            simulation's mean velocity minus the base motion's, over 0.1 s from contact on; for a
+            longer push, over the last 0.1 s of it that the search can see.
+        grazes: (hits,) whether that change is so small that there is no reaction (carry on).
     """
 
     rows: npt.NDArray[np.intp]
@@ -48,7 +47,7 @@ class LookAhead:
         return len(self.rows)
 
     def states_of(self, hit: int) -> BodyStates:
-        """Bodies (frames, bodies, ...) of one hit."""
+        """Body states (frames, bodies, ...) of one hit."""
         states = self.states
         return BodyStates(states.positions[hit], states.quaternions[hit], states.centers[hit])
 
@@ -60,41 +59,41 @@ def look_ahead_of(
     prepared: Sequence[PreparedImpact],
     traces: Sequence[Trace],
 ) -> LookAhead:
-    """Arrange simulated hits.
+    """Collect the hits that have a contact and did not diverge.
 
     Args:
         character: The character.
         config: Says what a graze is.
         bases: Base motion of each hit.
         prepared: Its impact.
-        traces: Its simulation, all as long after contact.
+        traces: Its simulation, all equally long after contact.
 
     Returns:
-        The hits that touched and did not diverge; each is bitwise what it would be alone.
+        Those hits; each has the bits that it would have alone.
     """
     rows = [
         row
         for row, trace in enumerate(traces)
         if trace.contact is not None and trace.diverged is None
     ]
-    hit = [traces[row] for row in rows]
-    firsts = [trace.contact.frame for trace in hit if trace.contact is not None]
-    own = tuple(bases[row] for row in rows)
+    hit_traces = [traces[row] for row in rows]
+    firsts = [trace.contact.frame for trace in hit_traces if trace.contact is not None]
+    hit_bases = tuple(bases[row] for row in rows)
     contacts = np.array(
         [prepared[row].start + first for row, first in zip(rows, firsts, strict=True)], np.intp
     )
     pushes = np.array([prepared[row].push_duration_s for row in rows])
-    frames = min((len(t.poses) - f for t, f in zip(hit, firsts, strict=True)), default=1)
+    frames = min((len(t.poses) - f for t, f in zip(hit_traces, firsts, strict=True)), default=1)
     poses = np.zeros((len(rows), frames, 59))
     velocities = np.zeros((len(rows), frames, 45))
-    for k, (trace, first) in enumerate(zip(hit, firsts, strict=True)):
+    for k, (trace, first) in enumerate(zip(hit_traces, firsts, strict=True)):
         poses[k] = trace.poses[first : first + frames]
         velocities[k] = trace.velocities[first : first + frames]
     states = kinematics_of_many(character, poses)
-    changes = _speed_changes(character, config, own, contacts, pushes, states)
+    changes = _speed_changes(character, config, hit_bases, contacts, pushes, states)
     return LookAhead(
         rows=np.array(rows, np.intp),
-        bases=own,
+        bases=hit_bases,
         contacts=contacts,
         poses=poses,
         velocities=velocities,
@@ -116,7 +115,7 @@ def kinematics_of_many(character: Character, poses: FloatArray) -> BodyStates:
 
 
 def base_poses(bases: Sequence[Motion], frames: npt.NDArray[np.intp]) -> FloatArray:
-    """Poses (hits, n, 59) of base motions at frames (hits, n); the ends hold before and after."""
+    """Poses (hits, n, 59) of base motions at frames (hits, n); beyond an end, its pose holds."""
     return np.stack(
         [base.poses[np.clip(at, 0, len(base) - 1)] for base, at in zip(bases, frames, strict=True)]
     )
@@ -130,7 +129,7 @@ def _speed_changes(
     pushes_s: FloatArray,
     states: BodyStates,
 ) -> FloatArray:
-    """What hits did to the speed of the centre of mass over the ground (hits,) [m/s]."""
+    """Changes of the speed of the centre of mass over the ground (hits,) [m/s]."""
     if not len(bases):
         return np.zeros(0)
     fps = config.physics.fps
@@ -138,9 +137,9 @@ def _speed_changes(
     seen = np.round(np.minimum(pushes_s, config.window.exit_max_s) * fps).astype(np.intp)
     last = np.maximum(frames, seen)
     span = np.stack([last - frames, last], axis=1)
-    own = kinematics_of_many(character, base_poses(bases, contacts[:, None] + span)).centers
+    planned = kinematics_of_many(character, base_poses(bases, contacts[:, None] + span)).centers
     centers = states.centers[np.arange(len(bases))[:, None], span]
-    moved = (centers[:, 1] - centers[:, 0]) - (own[:, 1] - own[:, 0])
+    moved = (centers[:, 1] - centers[:, 0]) - (planned[:, 1] - planned[:, 0])
     share = (character.masses / character.masses.sum())[:, None]
     change = np.sum(share * moved, axis=1)
     return np.asarray(np.hypot(change[:, 0], change[:, 1]) * fps / frames)

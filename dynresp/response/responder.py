@@ -1,4 +1,4 @@
-"""The whole way of a hit: simulate, choose and align a reaction, and go back to motion capture."""
+"""Respond to hits: simulate, choose and align a reaction, blend, and put the motion together."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from dynresp.support.errors import MotionError
 
 
 class Responder:
-    """Answers hits on one character with one reaction library."""
+    """Makes responses to hits on one character, with one reaction library."""
 
     def __init__(
         self,
@@ -38,17 +38,17 @@ class Responder:
         threads: int = 0,
         chooser: Chooser | None = None,
     ) -> None:
-        """Make ready.
+        """Prepare the simulation and the chooser.
 
         Args:
             character: The character.
             library: Its reactions, at the simulation's frame rate.
             config: Settings.
-            threads: Threads for the physics, 0 for all cores.
-            chooser: What chooses; None for the oracle.
+            threads: Threads of the simulation, 0 for all cores.
+            chooser: Chooses the reactions; None for the full search (oracle).
 
         Raises:
-            MotionError: Library and simulation differ in their frame rate.
+            MotionError: Library, search and simulation have different frame rates.
         """
         self.character = character
         self.library = library
@@ -64,39 +64,39 @@ class Responder:
         hits: Sequence[tuple[Motion, Impact]],
         progress: Callable[[str, int, int], None] | None = None,
     ) -> list[Response]:
-        """Answer hits, each on its own base motion.
+        """Make a response to each hit, each on its own base motion.
 
         Args:
             hits: Base motions (at the simulation's frame rate) and what hits them.
             progress: Called with the stage, how many are done, and of how many.
 
         Returns:
-            A response for each hit; one that diverges is marked and takes no other down.
+            A response for each hit; one that diverges is marked and changes no other.
 
         Raises:
-            SpecError: An impact lies outside its base motion.
+            SpecError: An impact is outside its base motion.
             MotionError: A base motion has another frame rate.
         """
-        tell = progress or (lambda stage, done, of: None)
+        report = progress or (lambda stage, done, of: None)
         responses: dict[int, Response] = {}
         for batch in self._stage.batches(hits):
-            responses.update(zip(batch.rows, self._respond_alike(batch, tell), strict=True))
+            responses.update(zip(batch.rows, self._respond_batch(batch, report), strict=True))
         return [responses[row] for row in range(len(hits))]
 
-    # -- steps of the way -----------------------------------------------------------------------
+    # -- steps ----------------------------------------------------------------------------------
 
-    def _respond_alike(
-        self, batch: HitBatch, tell: Callable[[str, int, int], None]
+    def _respond_batch(
+        self, batch: HitBatch, report: Callable[[str, int, int], None]
     ) -> list[Response]:
-        """Answer hits that all need the same scene."""
+        """Make responses to hits that need the same scene."""
         count = len(batch.rows)
-        tell("simulating", 0, count)
+        report("simulating", 0, count)
         traces = batch.simulation.look_ahead(self.config.horizon_s)
-        tell("choosing", 0, count)
+        report("choosing", 0, count)
         seen = look_ahead_of(self.character, self.config, batch.bases, batch.prepared, traces)
         found = self.chooser.choose(seen)
         choices = {int(row): choice for row, choice in zip(seen.rows, found, strict=True)}
-        tell("finishing", 0, count)
+        report("finishing", 0, count)
         final = simulate_to_blend_end(batch.simulation, choices, self.config.transition)
         responses = [
             self._compose(base, prepared, trace, choices.get(row), final.get(row))
@@ -111,7 +111,7 @@ class Responder:
                 speed_change=float(seen.speed_changes[k]),
                 look_ahead_states=seen.states_of(k),
             )
-        tell("finishing", count, count)
+        report("finishing", count, count)
         return responses
 
     def _compose(
@@ -129,7 +129,7 @@ class Responder:
         if choice is None or final is None or final.diverged is not None:
             last = final or trace
             if last.diverged is None:
-                # A miss: the base motion goes on as if nothing had been.
+                # A miss: the base motion goes on.
                 shown = round(self.config.carry_on_s * base.fps)
                 poses = base.poses[: start + len(last.poses) + shown]
             else:
@@ -140,17 +140,16 @@ class Responder:
 
         assert trace.contact is not None
         length = self.config.transition.blend_frames(base.fps)
-        out = trace.contact.frame + choice.exit
-        end = blend_into_choice(
-            self.character, self.config, final.poses[out : out + length + 1], choice
-        )
-        poses = np.concatenate([before, final.poses[:out], end.poses])
+        exit_frame = trace.contact.frame + choice.exit
+        simulated = final.poses[exit_frame : exit_frame + length + 1]
+        end = blend_into_choice(self.character, self.config, simulated, choice)
+        poses = np.concatenate([before, final.poses[:exit_frame], end.poses])
         return replace(
             whole,
             motion=self._with_contacts(base, start, poses),
             contact_frame=start + trace.contact.frame,
-            exit=start + out,
-            end=start + out + length,
+            exit=start + exit_frame,
+            end=start + exit_frame + length,
             choice=choice.name,
             entry=choice.entry + choice.offset if choice.offset else choice.entry,
             error=choice.error,
@@ -162,7 +161,7 @@ class Responder:
         )
 
     def _with_contacts(self, base: Motion, start: int, poses: FloatArray) -> Motion:
-        """The finished motion; until the simulation starts its foot contacts are the base's."""
+        """The finished motion; before the simulation its foot contacts are the base motion's."""
         states = self.character.kinematics(poses[start:])
         after = foot_contacts(self.character, states, base.fps)
         return Motion(poses, base.fps, base.name, np.concatenate([base.contacts[:start], after]))

@@ -1,7 +1,7 @@
-"""How good a response is, in numbers. `docs/quality.md` says what each means.
+"""Quality metrics of a response; `docs/quality.md` explains each.
 
-All are taken from the finished motion at its own frame rate (30 fps); only the root's jump also
-needs what the simulation and the reaction would have done at the seams.
+All are computed from the finished motion at its own frame rate (30 fps). Only the root's jump also
+needs the poses that simulation and reaction would have at the seams.
 """
 
 from __future__ import annotations
@@ -18,39 +18,38 @@ from dynresp.motion.motion import FEET, Motion
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.response import Response
 
-# A motion that stands still has hardly any joint speed steps; a seam is then measured against this
+# A motion that stands still has hardly any joint speed steps; a seam is then compared with this
 # [rad/s], about the sway of a standing person.
 _LEAST_REFERENCE = 0.1
-# The share of joint speed steps in the motion entered that a seam is measured against.
+# The percentile of joint speed steps in the entered motion with which a seam is compared.
 _PERCENTILE = 99.9
 
 
 @dataclass(frozen=True)
 class Quality:
-    """Figures of one response.
+    """Quality metrics of one response.
 
-    A "seam" is where physics hands over to the blend, or where the blend ends.
+    The seams are the two ends of the blend: exit and end.
 
     Attributes:
-        speed_step_exit: Largest joint speed step at the first seam [rad/s].
-        speed_step_end: The same at the second seam [rad/s].
-        speed_step_reference: 99.9th percentile of the joint speed steps in the motion entered,
+        speed_step_exit: Largest joint speed step at the exit [rad/s].
+        speed_step_end: The same at the end of the blend [rad/s].
+        speed_step_reference: 99.9th percentile of the joint speed steps in the entered motion,
             at least 0.1 rad/s.
-        speed_step_ratio: The larger of the two over the reference.
-        root_jump_m: How far the root departs at a seam, in one frame, from the simulation that it
-            leaves or the reaction that it joins [m].
-        root_jump_deg: The same of its orientation [degrees].
-        root_shake_m: How unsteady the root's own step is at a seam, whatever the reason: a hit
-            that still shakes the body counts as well [m].
-        root_shake_deg: The same of its orientation [degrees].
-        foot_skate_m: Way that standing feet slide, from contact to the end, both feet [m].
-        foot_skate_worst_m: The farthest that one foot slides in one stance [m].
-        foot_skate_blend_m: Way that standing feet slide in the blend, from exit to end, both feet
-            [m].
-        foot_depth_m: How deep a foot gets into the ground, from contact to the end [m].
+        speed_step_ratio: The larger of the two steps divided by the reference.
+        root_jump_m: Distance of the root, one frame inside a seam, from where the simulation (at
+            the exit) or the placed reaction (at the end) has it; the larger one [m].
+        root_jump_deg: The same for its orientation [degrees].
+        root_shake_m: How unsteady the root's own step is at a seam, for any reason: a hit that
+            still shakes the body counts, too [m].
+        root_shake_deg: The same for its orientation [degrees].
+        foot_skate_m: Distance that standing feet slide after contact, sum of both feet [m].
+        foot_skate_worst_m: Largest distance that one foot slides in one stance [m].
+        foot_skate_blend_m: Distance that standing feet slide in the blend, sum of both feet [m].
+        foot_depth_m: How deep a foot gets into the ground after contact [m].
         body_depth_m: How deep any other body gets [m].
         free_physics_s: Time from contact to the exit [s].
-        physics_s: Time from contact until the blend has ended, while the simulation has a say [s].
+        physics_s: Time from contact to the end of the blend [s].
     """
 
     speed_step_exit: float
@@ -71,15 +70,16 @@ class Quality:
 
 
 def measure(response: Response, character: Character) -> Quality | None:
-    """Figures of a response; None where nothing was hit or the simulation diverged."""
+    """Compute the metrics; None where nothing was hit or the simulation diverged."""
     if response.exit is None or response.end is None or response.contact_frame is None:
         return None
     assert response.entered_motion is not None
     motion = response.motion
     steps = joint_speed_steps(motion)
     at_seams = [float(steps[k - 1].max()) for k in (response.exit, response.end)]
-    own = joint_speed_steps(response.entered_motion)
-    reference = max(float(np.percentile(own, _PERCENTILE)) if own.size else 0.0, _LEAST_REFERENCE)
+    recorded = joint_speed_steps(response.entered_motion)
+    reference = float(np.percentile(recorded, _PERCENTILE)) if recorded.size else 0.0
+    reference = max(reference, _LEAST_REFERENCE)
     assert response.simulated_after_exit is not None
     assert response.placed_before_end is not None
     jumps = [
@@ -117,8 +117,8 @@ def joint_speed_steps(motion: Motion) -> FloatArray:
     """Change of each joint's angular velocity from one frame step to the next.
 
     Returns:
-        (frames - 2, 13) [rad/s]; row k is the change at frame k + 1. As vectors, so a joint that
-        turns about another axis at the same speed counts.
+        (frames - 2, 13) [rad/s]; row k is the change at frame k + 1. Velocities are vectors, so a
+        change of axis at the same speed counts.
     """
     q = motion.joint_quaternions
     turns = rotations.to_rotation_vector(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
@@ -132,11 +132,10 @@ def _root_distance(pose: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 
 def root_shake(motion: Motion, frame: int) -> tuple[float, float]:
-    """How unsteady the root's step is from a frame to the next, its smooth movement taken out.
+    """How unsteady the root's step is from a frame to the next, apart from smooth movement.
 
-    What the step is more than the mean of the steps before and after it. A smooth movement has
-    none, whatever its speed and acceleration; a shift between the two frames comes out as that
-    shift.
+    It is the difference of the step from the mean of the steps before and after it. A movement of
+    constant acceleration has none; a shift between the two frames gives the size of that shift.
 
     Args:
         motion: Any motion.

@@ -1,1 +1,1 @@
-"""Time alignment: the exit from physics and the entry into the reaction."""
+"""Time alignment: exit from the simulation and entry into the reaction."""

@@ -1,1 +1,1 @@
-"""Full search: all reactions and the base motion compared with what physics shows."""
+"""Full search: compares all reactions and the base motion with the simulation."""
