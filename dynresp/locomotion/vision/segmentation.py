@@ -18,7 +18,9 @@ from dynresp.support.errors import MotionError
 from dynresp.support.extras import require
 
 Picture = npt.NDArray[np.uint8]
+"""(height, width, 3) blue green red, as in OpenCV."""
 Mask = npt.NDArray[np.uint8]
+"""(height, width) not 0 inside a silhouette."""
 
 EMPTY_ROOM_S = 1.0
 """A video begins with the empty room, for this long [s]."""

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.locomotion.vision.silhouettes import Mask
+from dynresp.locomotion.vision.segmentation import Mask
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import UsageError
 from dynresp.support.extras import require

@@ -16,12 +16,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from dynresp.locomotion.vision.segmentation import Mask
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.extras import require
-
-Mask = npt.NDArray[np.uint8]
 
 PIXEL = 0.03
 """Size of a pixel [m]."""

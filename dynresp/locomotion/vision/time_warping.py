@@ -7,7 +7,7 @@ this way.
 
 The kernel is our own. Libraries compare whole sequences with whole ones, or find a short one in a
 long one. Here one sequence is compared with the beginnings of many sequences of different lengths,
-ten times a second, and needs nothing but NumPy and numba.
+ten times a second. This needs nothing but NumPy and numba.
 """
 
 from __future__ import annotations

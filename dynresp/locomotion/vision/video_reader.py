@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynresp.locomotion.vision.segmentation import Picture
 from dynresp.support.errors import MotionFileError
 from dynresp.support.extras import require
-
-Picture = npt.NDArray[np.uint8]
 
 MAX_SIDE = 8192
 """Largest number of pixels along a side of a picture."""
