@@ -1,4 +1,4 @@
-"""A trained classifier: which reaction the oracle would choose, told from how a hit begins."""
+"""`Classifier`: predicts from a look-ahead which reaction the full search (oracle) would choose."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ Grouping: TypeAlias = Literal["reactions", "strategies"]
 GROUPINGS: tuple[str, ...] = get_args(Grouping)
 """What a class stands for: one reaction, or all reactions of a strategy."""
 
-_AGAIN = "train one for them with `dynresp generate` and `dynresp train`"
+_HOW_TO_TRAIN = "train one for them with `dynresp generate` and `dynresp train`"
 
 
 class ClassifierError(UsageError):
-    """A classifier that cannot be used: a damaged file, or one trained for something else."""
+    """A classifier cannot be used: its file is damaged, or it was trained for something else."""
 
 
 @dataclass(frozen=True)
 class TrainedFor:
-    """What a classifier belongs to.
+    """The library and character that a classifier was trained for.
 
     Attributes:
         library_name: Name of the reaction library.
-        library: Its identity.
+        library: The library's identity.
         character: The character's identity.
     """
 
@@ -43,22 +43,22 @@ class TrainedFor:
 
     @classmethod
     def of(cls, library: ReactionLibrary, character: Character) -> TrainedFor:
-        """What a classifier for these would belong to."""
+        """What a classifier for a library and a character is trained for."""
         return cls(library.name, library.identity, character.identity)
 
 
 @dataclass(frozen=True)
 class TrainedOn:
-    """Which samples a classifier was trained on (`dynresp.learning.holdout`).
+    """The samples that a classifier was trained on (see `dynresp.learning.holdout`).
 
     Attributes:
-        dataset: Origin of the dataset (`datasets.facts.Facts.origin`), the same however many
-            samples it has.
-        count: How many samples the dataset had, misses and all.
-        samples: How many of them were trained on.
-        limit: How many were asked for; None for all that were not held out.
-        seed: Of the chance by which samples were held out.
-        held_out: Share that was held out.
+        dataset: Origin of the dataset (`datasets.facts.Facts.origin`); it does not depend on the
+            number of samples.
+        count: Number of samples in the dataset, misses included.
+        samples: Number of samples used in training.
+        limit: Largest number of samples to use; None for all that were not held out.
+        seed: Seed of the random choice of samples that were held out.
+        held_out: Share of samples that were held out.
     """
 
     dataset: str
@@ -71,22 +71,24 @@ class TrainedOn:
 
 @dataclass(frozen=True, eq=False)
 class Classifier:
-    """What a trained model is and what it predicts.
+    """A trained model and what is known of it.
 
     Attributes:
         grouping: What a class stands for, one of `GROUPINGS`.
-        classes: Names of the classes that can be predicted: of reactions or strategies, and
-            `carry_on` to go on with the base motion.
-        members: For each class the choices that belong to it: names of reactions, or `carry_on`.
-        absent: Choices of the library that no training sample was labelled with, so that no class
-            stands for them.
-        feature_names: The features that it takes, some of `features.FEATURE_NAMES`.
+        classes: Names of the classes that it can predict: reactions or strategies, and `carry_on`
+            for no reaction.
+        members: For each class its choices: names of reactions, or `carry_on`.
+        absent: Choices of the library that no training sample had, so that they have no class.
+        feature_names: The features that it takes, some of `hit_features.FEATURE_NAMES`.
         trained_for: Library and character.
         trained_on: Samples.
-        settings: The settings that decided over the labels, by name.
+        settings: The settings on which the training labels depend, by name.
         exact: Predicts as the support vector machine does.
-        reduced: Predicts from fewer principal components, where speed counts more.
-        facts: What was measured in training, as JSON has it.
+        reduced: Predicts from fewer principal components; faster.
+        facts: What was measured in training, as JSON values.
+
+    Raises:
+        ClassifierError: The parts do not fit together; the message says which.
     """
 
     grouping: str
@@ -103,24 +105,20 @@ class Classifier:
     _columns: npt.NDArray[np.intp] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Find the features' columns and check that all parts fit together.
-
-        Raises:
-            ClassifierError: They do not; the message says which.
-        """
-        places = {name: column for column, name in enumerate(FEATURE_NAMES)}
-        unknown = [name for name in self.feature_names if name not in places]
+        """Find the features' columns, and check that all parts fit together."""
+        positions = {name: column for column, name in enumerate(FEATURE_NAMES)}
+        unknown = [name for name in self.feature_names if name not in positions]
         if unknown or not self.feature_names:
             raise ClassifierError(
-                f"the classifier takes {unknown[0] if unknown else 'no feature'!r}, which is no "
-                f"feature of this version of dynresp; {_AGAIN}"
+                f"the classifier takes {unknown[0] if unknown else 'no feature'!r}, which is not a "
+                f"feature of this version of dynresp; {_HOW_TO_TRAIN}"
             )
-        columns = np.array([places[name] for name in self.feature_names], dtype=np.intp)
+        columns = np.array([positions[name] for name in self.feature_names], dtype=np.intp)
         columns.flags.writeable = False
         object.__setattr__(self, "_columns", columns)
-        names = [name for own in self.members for name in own]
+        names = [name for choices in self.members for name in choices]
         predictors = (self.exact, self.reduced)
-        wide = [predictor.projection.shape[1] for predictor in predictors]
+        widths = [predictor.projection.shape[1] for predictor in predictors]
         problems = {
             f"an unknown grouping, {self.grouping!r}": self.grouping not in GROUPINGS,
             "members of other classes": len(self.members) != len(self.classes),
@@ -129,15 +127,17 @@ class Classifier:
             "a choice in two classes": len(set(names)) < len(names),
             "a choice both present and absent": not set(names).isdisjoint(self.absent),
             "a predictor of other classes": any(p.classes != len(self.classes) for p in predictors),
-            "a predictor of other features": wide != [len(columns)] * 2,
+            "a predictor of other features": widths != [len(columns)] * 2,
         }
         for problem, found in problems.items():
             if found:
-                raise ClassifierError(f"the classifier has {problem}; train it anew")
+                raise ClassifierError(
+                    f"the classifier has {problem}; train it again with `dynresp train`"
+                )
 
     @property
     def columns(self) -> npt.NDArray[np.intp]:
-        """Columns of the features that it takes, in `features.FEATURE_NAMES`; read-only."""
+        """Columns of its features in `hit_features.FEATURE_NAMES`; read-only."""
         return self._columns
 
     def rank(
@@ -147,16 +147,16 @@ class Classifier:
 
         Args:
             features: (n, all features) or (all features,), in the order of
-                `features.FEATURE_NAMES`; those that the classifier does not take may be NaN.
-            best: How many.
-            reduced: Take the reduced model.
+                `hit_features.FEATURE_NAMES`; those that the classifier does not take may be NaN.
+            best: How many classes.
+            reduced: Whether to use the reduced model.
 
         Returns:
             (n, best) indices into `classes`, the best first.
 
         Raises:
-            UsageError: Features of another shape, or not finite where they are taken; `best` is
-                not between one and the number of classes.
+            UsageError: The features have another shape, or one that is used is not finite; or
+                `best` is not between one and the number of classes.
         """
         rows = np.asarray(features)
         if rows.ndim not in (1, 2) or rows.shape[-1] != len(FEATURE_NAMES):
@@ -168,10 +168,10 @@ class Classifier:
         return predictor.rank(rows.take(self._columns, axis=-1), best)
 
     def check(self, given: TrainedFor) -> None:
-        """Refuse another library or character than what it was trained for.
+        """Refuse a library or character that it was not trained for.
 
         Args:
-            given: What it shall be used with.
+            given: The library and character to use it with.
 
         Raises:
             ClassifierError: It was trained for something else; the message says what.
@@ -180,21 +180,20 @@ class Classifier:
         if own.character != given.character:
             raise ClassifierError(
                 f"the classifier was trained for another character ({own.character}) than this one "
-                f"({given.character}); {_AGAIN}"
+                f"({given.character}); {_HOW_TO_TRAIN}"
             )
         if own.library != given.library:
             raise ClassifierError(
                 f"the classifier was trained for the library {own.library_name!r} "
                 f"({own.library}), not for {given.library_name!r} as it is on this machine "
-                f"({given.library}); {_AGAIN}"
+                f"({given.library}); {_HOW_TO_TRAIN}"
             )
 
     def differing_settings(self, given: Mapping[str, Any]) -> list[str]:
-        """Names of settings under which the oracle would choose otherwise than in training.
+        """Names of settings that differ from training, so that the labels would differ.
 
         Args:
-            given: The settings in force, by name; those that do not decide over labels may be
-                there, too.
+            given: The settings in use, by name; it may hold others, too.
         """
         return [
             name

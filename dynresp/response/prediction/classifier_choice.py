@@ -1,4 +1,4 @@
-"""The choice of the classifier: a prediction, and the alignment of what was predicted."""
+"""`ClassifierChooser`: predicts the best reactions, and aligns only these."""
 
 from __future__ import annotations
 
@@ -24,13 +24,12 @@ from dynresp.response.search.full_search_choice import reaction_tracks
 class ClassifierChooser:
     """Chooses by prediction and sparse alignment (Zordan et al. 2007, sections 4 and 5).
 
-    The classes of reactions that the classifier takes to be best are aligned: one, or the best two
-    or three, of which the one of least window error is taken. Where a class is a whole strategy,
-    all its reactions are aligned.
+    The best one, two or three classes are aligned, and the reaction of least mismatch (window
+    error) is chosen. If a class is a whole strategy, all its reactions are aligned.
 
-    Whether the base motion is carried on is not guessed but measured, as the oracle does it: a
-    graze is known from the simulation, and to see how well the base motion fits costs as much as
-    to align one reaction. That halves the share of choices that are not the oracle's.
+    No reaction (carry on) is not predicted but measured, as in the full search (oracle): a graze is
+    known from the simulation, and the fit of the base motion costs as much as one alignment. This
+    halves the share of choices that differ from the full search.
     """
 
     def __init__(
@@ -44,16 +43,16 @@ class ClassifierChooser:
         reduced: bool = False,
         alignment: AlignmentConfig | None = None,
     ) -> None:
-        """Lay the library out once.
+        """Check the classifier and prepare the library.
 
         Args:
             character: The character.
             library: Its reactions.
-            config: Settings.
-            classifier: Trained for this character and library.
-            best: How many of the predicted classes of reactions are aligned.
-            reduced: Predict with the reduced model.
-            alignment: Settings of the alignment.
+            config: Settings of the response.
+            classifier: A classifier trained for this character and library.
+            best: How many of the predicted classes are aligned.
+            reduced: Whether to predict with the reduced model.
+            alignment: Settings of the alignment; None for the defaults.
 
         Raises:
             ClassifierError: The classifier was trained for something else.
@@ -61,19 +60,19 @@ class ClassifierChooser:
         """
         classifier.check(TrainedFor.of(library, character))
         known = {CARRY_ON, *(reaction.name for reaction in library.reactions)}
-        strange = sorted({name for own in classifier.members for name in own} - known)
-        if strange:
+        unknown = sorted({name for choices in classifier.members for name in choices} - known)
+        if unknown:
             raise ClassifierError(
-                f"the classifier predicts {strange[0]!r}, which the library {library.name!r} has "
-                "not; train it anew"
+                f"the classifier predicts {unknown[0]!r}, which the library {library.name!r} does "
+                "not have; train it again with `dynresp train`"
             )
         self.character = character
         self.library = library
         self.config = config
         self.classifier = classifier
         self._best = best
-        # One more is asked for: to carry on may be among them.
-        self._asked = min(best + 1, len(classifier.classes))
+        # One more class than is aligned, because `carry_on` may be among them.
+        self._ranked = min(best + 1, len(classifier.classes))
         self._reduced = reduced
         self._aligner = Aligner(
             reaction_tracks(character, library, config), config.window, alignment
@@ -85,7 +84,7 @@ class ClassifierChooser:
             return []
         fps = self.config.physics.fps
         features = extract(self.character, hits.poses, hits.velocities, fps)
-        ranked = self.classifier.rank(features, self._asked, reduced=self._reduced)
+        ranked = self.classifier.rank(features, self._ranked, reduced=self._reduced)
         fits = align_base_motions(self.character, self.config, hits)
         return [
             self._choose(hits, row, self._reactions(ranked[row]), fit)
@@ -93,27 +92,31 @@ class ClassifierChooser:
         ]
 
     def _reactions(self, ranked: npt.NDArray[np.int64]) -> list[str]:
-        """The members of the best classes but that to carry on."""
-        members = [self.classifier.members[place] for place in ranked]
-        classes = [own for own in members if CARRY_ON not in own][: self._best]
-        return [name for own in classes for name in own]
+        """The reactions of the best classes, without `carry_on`."""
+        members = [self.classifier.members[c] for c in ranked]
+        reactions = [names for names in members if CARRY_ON not in names][: self._best]
+        return [name for names in reactions for name in names]
 
-    def _choose(self, hits: LookAhead, row: int, names: list[str], stay: BaseMotionFit) -> Choice:
-        """To carry on, or the best of what was predicted."""
-        errors = {CARRY_ON: stay.error}
-        carry_on = Choice(CARRY_ON, hits.bases[row], stay.exit, stay.entry, stay.error, errors)
+    def _choose(
+        self, hits: LookAhead, row: int, names: list[str], base_fit: BaseMotionFit
+    ) -> Choice:
+        """Choose the best predicted reaction, or no reaction (carry on)."""
+        errors = {CARRY_ON: base_fit.error}
+        carry_on = Choice(
+            CARRY_ON, hits.bases[row], base_fit.exit, base_fit.entry, base_fit.error, errors
+        )
         if hits.grazes[row] or not names:
             return carry_on
         trace = hits.states.centers[row], hits.states.quaternions[row]
         aligned = self._aligner.align(*trace, names)
         errors |= {alignment.reaction: alignment.error for alignment in aligned}
         best = min(aligned, key=lambda alignment: alignment.error)
-        if stay.error <= min(best.error, self.config.carry_on_max_error):
+        if base_fit.error <= min(best.error, self.config.carry_on_max_error):
             return carry_on
         return self._enter(self._aligner.snap(*trace, best), errors)
 
     def _enter(self, alignment: Alignment, errors: dict[str, float]) -> Choice:
-        """A reaction entered between two of its frames: its clip read that much later."""
+        """The choice of a reaction; if it is entered between two frames, its clip is resampled."""
         motion = self.library.reaction(alignment.reaction).motion
         entry = math.floor(alignment.entry_frame)
         offset = alignment.entry_frame - entry

@@ -1,7 +1,7 @@
-"""The file of a classifier: one skops file that can also be read without skops and scikit-learn.
+"""Reads and writes classifier files (`.skops`), without skops and scikit-learn to predict.
 
-A `.skops` file is a zip archive. Ours holds, beside what `skops.io.dump` writes of the two
-scikit-learn pipelines, the compiled predictors and all that is known of them:
+A `.skops` file is a zip archive. A classifier's file holds what `skops.io.dump` writes of the two
+scikit-learn pipelines, and the compiled predictors with all that is known of them:
 
 ==========================  ======================================================================
 member                      what it holds
@@ -10,14 +10,14 @@ member                      what it holds
 ``classifier.json``         classes, members, features, identities, settings, measured facts
 ``exact.projection.npy``    (k, F) float64; with ``exact.offset.npy`` (k,) float64 and
                             ``exact.weights.npy`` (pairs, monomials) float64 or float32 what
-                            `prediction.PairwiseQuadratic` says
+                            `compiled_classifier.PairwiseQuadratic` says
 ``reduced.*.npy``           the same of the reduced model
 ==========================  ======================================================================
 
-So `skops.io.load` opens it as any other, while the responder reads arrays alone, in milliseconds
-where importing scikit-learn and skops takes two seconds. Nothing is ever unpickled. The two halves
-are written together and never changed; each member has its checksum. The pipelines can be left out:
-their support vectors are training samples, which not everyone may pass on, and most of the file.
+So `skops.io.load` opens it as usual, while dynresp reads only the arrays: that takes milliseconds,
+and importing scikit-learn and skops two seconds. Nothing is unpickled. Pipelines and predictors are
+written together and never changed; each member has its checksum. The pipelines can be left out:
+their support vectors are training samples, which may be under a licence, and most of the file.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ _MAX_HEADER_BYTES = 1_000
 _MAX_DIRECTORY_BYTES = 1 << 20
 _ARRAYS = ("projection", "offset", "weights")
 _ZIP_END = struct.Struct("<4s4H2LH")
-# All that a file of ours is made of; what skops itself would trust is far more.
+# The only types in a classifier's pipelines. skops by itself would trust many more.
 _TRUSTED = {
     ("builtins", "dict"),
     ("builtins", "list"),
@@ -93,8 +93,8 @@ def save_classifier(
     Args:
         path: The file; missing folders are made.
         classifier: The classifier.
-        pipelines: The scikit-learn pipelines that it was compiled from, "exact" and "reduced";
-            None leaves them out.
+        pipelines: The scikit-learn pipelines that it was compiled from, by name: "exact" and
+            "reduced". None leaves them out.
 
     Raises:
         DynrespError: The file cannot be written.
@@ -124,7 +124,7 @@ def load_classifier(path: Path | str) -> Classifier:
     Sizes are checked before anything is unpacked.
 
     Raises:
-        ClassifierError: The file cannot be read, is damaged or out of bounds, or was written by
+        ClassifierError: The file cannot be read, is damaged or too large, or was written by
             another version; the message names it.
     """
     with _opened(Path(path)) as archive:
@@ -150,31 +150,34 @@ def load_pipelines(path: Path | str) -> dict[str, Pipeline]:
 
     Returns:
         "exact" and "reduced"; each takes the features named in `Classifier.feature_names` and
-        predicts indices of classes of the training's grouping.
+        predicts indices of the classes of its training.
 
     Raises:
-        ClassifierError: The file cannot be read, is damaged, or holds anything but such pipelines.
+        ClassifierError: The file cannot be read, is damaged, or holds other objects.
     """
     require("skops", "sklearn")
     path = Path(path)
     with _opened(path) as archive:
         _read_about(archive)
         if _SCHEMA not in archive.namelist():
-            raise ClassifierError("holds the compiled models alone, without their pipelines")
+            raise ClassifierError(
+                "holds the compiled models alone, without their pipelines; train it again with "
+                "`dynresp train`, without --compiled-only"
+            )
         others = _types(json.loads(_text_of(archive, _SCHEMA))) - _TRUSTED
         if others:
             named = ", ".join(sorted(".".join(kind) for kind in others)[:5])
             raise ClassifierError(
-                f"it holds objects that no classifier is made of ({named}), and is not opened"
+                f"it holds objects that do not belong to a classifier ({named}); it is not opened"
             )
         import skops.io
         from sklearn.pipeline import Pipeline
 
         found = skops.io.load(path, trusted=[])
         if not isinstance(found, dict) or found.keys() != set(MODELS):
-            raise ValueError(f"no dictionary of {' and '.join(MODELS)}")
+            raise ValueError(f"not a dictionary of {' and '.join(MODELS)}")
         if not all(isinstance(pipeline, Pipeline) for pipeline in found.values()):
-            raise ValueError("no pipelines")
+            raise ValueError("not pipelines")
         for model, pipeline in found.items():
             _check_same(archive, model, PairwiseQuadratic.from_pipeline(pipeline))
         return found
@@ -185,7 +188,7 @@ def load_pipelines(path: Path | str) -> dict[str, Pipeline]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """The archive, while the block runs; whatever goes wrong names the file."""
+    """Open the archive while the block runs; every error names the file."""
     try:
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "no such file"
@@ -194,15 +197,18 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
             _check_archive(file)
             with zipfile.ZipFile(file) as archive:
                 if sum(member.file_size for member in archive.infolist()) > MAX_FILE_BYTES:
-                    raise ClassifierError("would be far larger unpacked than a classifier is")
+                    raise ClassifierError("is too large when unpacked for a classifier")
                 yield archive
     except ClassifierError as error:
         raise ClassifierError(f"{path}: {error}") from error.__cause__
     # On damaged files zipfile, zlib, json, NumPy and skops raise dozens of kinds of errors.
     except Exception as error:
-        told = str(error) if isinstance(error, DynrespError) else f"{type(error).__name__}: {error}"
+        reason = (
+            str(error) if isinstance(error, DynrespError) else f"{type(error).__name__}: {error}"
+        )
         raise ClassifierError(
-            f"{path}: damaged or no classifier ({told[:300]}); train it anew with `dynresp train`"
+            f"{path}: damaged, or not a classifier ({reason[:300]}); train it again with "
+            "`dynresp train`"
         ) from error
 
 
@@ -214,9 +220,11 @@ def _check_archive(file: io.BufferedReader) -> None:
     file.seek(-min(size, _ZIP_END.size), os.SEEK_END)
     end = file.read()
     if len(end) < _ZIP_END.size or not end.startswith(b"PK\x05\x06"):
-        raise ClassifierError("no .skops file, or cut short: a zip archive's end is missing")
+        raise ClassifierError(
+            "not a .skops file, or cut short: the end of the zip archive is missing"
+        )
     if _ZIP_END.unpack(end)[5] > _MAX_DIRECTORY_BYTES:
-        raise ClassifierError("an archive of far more than a classifier")
+        raise ClassifierError("an archive of more files than a classifier has")
 
 
 def _about(classifier: Classifier) -> dict[str, Any]:
@@ -239,19 +247,19 @@ def _about(classifier: Classifier) -> dict[str, Any]:
 
 def _read_about(archive: zipfile.ZipFile) -> dict[str, Any]:
     if _ABOUT not in archive.namelist():
-        raise ClassifierError(f"no classifier of dynresp (it has no {_ABOUT})")
+        raise ClassifierError(f"not a classifier of dynresp (it has no {_ABOUT})")
     about = json.loads(_text_of(archive, _ABOUT))
     if not isinstance(about, dict) or about.get("format") != FORMAT:
-        raise ClassifierError(f"no classifier of dynresp ({_ABOUT} does not say that it is one)")
+        raise ClassifierError(f"not a classifier of dynresp ({_ABOUT} does not say that it is one)")
     if about.get("format_version") != FORMAT_VERSION:
         raise ClassifierError(
             f"has format version {about.get('format_version')!r:.50}, and this dynresp reads "
-            f"{FORMAT_VERSION}; train it anew"
+            f"{FORMAT_VERSION}; train it again with `dynresp train`"
         )
     if about.get("features_identity") != features_identity():
         raise ClassifierError(
-            "was trained on other features than this version of dynresp computes; generate the "
-            "dataset anew and train it again"
+            "was trained on other features than this version of dynresp computes; make the dataset "
+            "again with `dynresp generate`, then train with `dynresp train`"
         )
     return about
 
@@ -265,7 +273,7 @@ def _text_of(archive: zipfile.ZipFile, name: str) -> str:
 def _read_predictor(
     archive: zipfile.ZipFile, model: str, about: Mapping[str, Any]
 ) -> PairwiseQuadratic:
-    """A compiled predictor whose arrays have the shapes that the classes and features demand."""
+    """Read a compiled predictor; its arrays must have the shapes for the classes and features."""
     classes, features = len(_texts(about, "classes")), len(_texts(about, "features"))
     k = about["components"][model]
     if not 2 <= classes <= MAX_CLASSES:
@@ -284,12 +292,12 @@ def _read_predictor(
 
 
 def _array(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> npt.NDArray[np.floating]:
-    """An array of this shape; only `weights` may be of single precision."""
+    """Read an array of this shape; only `weights` may have single precision."""
     types = ("<f4", "<f8") if ".weights" in name else ("<f8",)
     info = archive.getinfo(name)
     with archive.open(info) as member:
         if np.lib.format.read_magic(member) != (1, 0):
-            raise ValueError(f"{name} is no .npy array of version 1.0")
+            raise ValueError(f"{name} is not a .npy array of version 1.0")
         found, fortran, dtype = np.lib.format.read_array_header_1_0(
             member, max_header_size=_MAX_HEADER_BYTES
         )
@@ -299,14 +307,14 @@ def _array(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...]) -> npt.N
         if size > min(MAX_ARRAY_BYTES, info.file_size):
             raise ValueError(f"{name} has {info.file_size} bytes, its shape {shape} needs {size}")
         data = member.read(size)
-        # Reading to the end also has the checksum compared.
+        # Reading to the end also checks the checksum.
         if len(data) != size or member.read(1):
             raise ValueError(f"{name} has another size than {shape} needs")
     return np.frombuffer(data, dtype=dtype).reshape(shape)
 
 
 def _types(node: Any) -> set[tuple[str, str]]:
-    """All types that a skops schema would make."""
+    """All types of which a skops schema would make objects."""
     if isinstance(node, list):
         return set().union(*(_types(item) for item in node))
     if not isinstance(node, dict):
@@ -318,7 +326,7 @@ def _types(node: Any) -> set[tuple[str, str]]:
 
 
 def _check_same(archive: zipfile.ZipFile, model: str, compiled: PairwiseQuadratic) -> None:
-    """Refuse pipelines that are not those which the predictor was compiled from."""
+    """Refuse pipelines from which the predictor was not compiled."""
     for name in _ARRAYS:
         wanted = np.asarray(getattr(compiled, name))
         stored = _array(archive, f"{model}.{name}.npy", wanted.shape)
@@ -332,7 +340,7 @@ def _trained_on(table: Mapping[str, Any]) -> TrainedOn:
     _text(found.dataset)
     whole = (found.count, found.samples, found.seed)
     if any(type(n) is not int or n < 0 for n in whole) or not 0.0 <= found.held_out < 1.0:
-        raise ValueError("what it was trained on is not told")
+        raise ValueError("trained_on holds wrong numbers")
     if found.limit is not None and type(found.limit) is not int:
         raise ValueError("limit must be a whole number")
     return found
@@ -344,19 +352,19 @@ def _texts(table: Mapping[str, Any], key: str) -> tuple[str, ...]:
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise ValueError(f"expected a text, got {value!r:.50}")
+        raise ValueError(f"expected text, got {value!r:.50}")
     return value
 
 
 def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
     found = table[key]
     if not isinstance(found, dict):
-        raise ValueError(f"{key} is no table")
+        raise ValueError(f"{key} is not a table")
     return found
 
 
 def _facts(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Measured facts, of which those that an evaluation repeats must be there."""
+    """Measured facts; those that an evaluation repeats must be there."""
     facts = _table(table, "facts")
     _text(facts["vector"])
     if not all(type(slice_s) in (int, float) for slice_s in facts["slices_s"]):

@@ -1,4 +1,6 @@
-"""A trained classifier, compiled: the cost of a prediction no longer depends on its training.
+"""`PairwiseQuadratic`: a trained pipeline, compiled so that predictions are fast.
+
+The cost of a prediction does not depend on the number of training samples.
 
 The pipeline is `StandardScaler`, `PCA`, `SVC` with a polynomial kernel of degree two. The first two
 steps are one affine map to k principal components z. The kernel between z and a support vector s,
@@ -55,7 +57,7 @@ class PairwiseQuadratic:
     _padded: Weights = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the arrays and lay out the weights for the compiled loops.
+        """Check the arrays and pad the weights for the compiled loops.
 
         Raises:
             UsageError: Shapes do not fit together, or a value is not finite.
@@ -89,7 +91,7 @@ class PairwiseQuadratic:
             if not np.all(np.isfinite(array)):
                 raise UsageError(
                     f"{name.replace('_padded', 'weights')} of a predictor hold NaN or infinity; "
-                    f"train it anew."
+                    f"train it again."
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -101,13 +103,13 @@ class PairwiseQuadratic:
 
         Args:
             pipeline: Fitted `StandardScaler`, `PCA`, `SVC(kernel="poly", degree=2,
-                break_ties=True, decision_function_shape="ovr")`; `gamma`, `coef0` and C are free.
+                break_ties=True, decision_function_shape="ovr")`, with any `gamma`, `coef0` and C.
 
         Returns:
             The predictor in double precision. Class i is `pipeline.classes_[i]`.
 
         Raises:
-            UsageError: The pipeline is another one or not fitted.
+            UsageError: The pipeline has other steps or settings, or is not fitted.
         """
         scaler, pca, svc = _checked_steps(pipeline)
         projection = pca.components_ / scaler.scale_
@@ -116,7 +118,7 @@ class PairwiseQuadratic:
         return cls(projection, offset, _pair_weights(svc), classes)
 
     def single_precision(self) -> PairwiseQuadratic:
-        """The same with weights and their products in float32: half the memory, twice the speed."""
+        """The same with weights and products in float32: half the memory, twice the speed."""
         return replace(self, weights=self.weights.astype(np.float32))
 
     def pair_decisions(self, features: npt.ArrayLike) -> Weights:
@@ -154,8 +156,8 @@ class PairwiseQuadratic:
 
         Returns:
             (n, classes). With more than two classes this is scikit-learn's
-            `SVC.decision_function`; with two, where that is one number a row, votes and decisions
-            are counted in the same way.
+            `SVC.decision_function`. With two classes scikit-learn has one number a row; here votes
+            and decisions are counted as with more.
 
         Raises:
             UsageError: Features of another shape, or not finite.
@@ -172,8 +174,8 @@ class PairwiseQuadratic:
     def rank(self, features: npt.ArrayLike, best: int = 1) -> npt.NDArray[np.int64]:
         """Find the best classes.
 
-        Evaluates only the pairs that can matter, about an eighth of 300 for the first place, and
-        gives what all pairs would give.
+        Evaluates only the pairs that can matter (about an eighth of 300 pairs for the best class)
+        and gives the same result as all pairs.
 
         Args:
             features: (n, F) or (F,).
@@ -189,8 +191,8 @@ class PairwiseQuadratic:
         """
         if not 1 <= best <= self.classes:
             raise UsageError(
-                f"{best} best classes were asked for; expected 1 to {self.classes}, the number of "
-                f"classes of this predictor."
+                f"best is {best}; expected 1 to {self.classes}, the number of classes of this "
+                f"predictor."
             )
         from dynresp.response.prediction import (
             compiled_classifier_kernel as prediction_kernel,
@@ -221,13 +223,13 @@ class PairwiseQuadratic:
     def _refuse(bad: int) -> None:
         if bad >= 0:
             raise UsageError(
-                f"features of row {bad} hold NaN, infinity or values beyond any the classifier "
-                f"can judge; check the simulation they come from."
+                f"features of row {bad} hold NaN, infinity or values that are too large; check "
+                f"the simulation they come from."
             )
 
 
 def _monomial_count(components: int) -> int:
-    """Monomials of so many variables up to degree two."""
+    """Number of monomials up to degree two of this many variables."""
     return 1 + components + components * (components + 1) // 2
 
 
@@ -276,7 +278,7 @@ def _pair_weights(svc: Any) -> FloatArray:
     of class i, row r belongs to the pair with class r if r < i, else with class r + 1.
     """
     classes, components = len(svc.classes_), svc.support_vectors_.shape[1]
-    # What scikit-learn shows of a classifier of two classes has the other sign than libsvm's.
+    # With two classes scikit-learn's coefficients have the opposite sign of libsvm's.
     sign = -1.0 if classes == 2 else 1.0
     weights = np.zeros((classes * (classes - 1) // 2, _monomial_count(components)))
     first = np.concatenate([[0], np.cumsum(svc.n_support_)])
@@ -292,7 +294,7 @@ def _pair_weights(svc: Any) -> FloatArray:
 
 
 def _pair_index(i: int, j: int, classes: int) -> int:
-    """Place of the pair (i, j), i < j, in the order of the pairs."""
+    """Index of the pair (i, j), i < j, in the order of the pairs."""
     return i * (2 * classes - i - 1) // 2 + j - i - 1
 
 

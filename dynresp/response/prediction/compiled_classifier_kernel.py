@@ -1,16 +1,17 @@
-"""The compiled inner loops of prediction: all pairs of classes, or only those that decide.
+"""Compiled loops of prediction: all pairs of classes, or only the pairs that decide.
 
 Importing this module compiles it (a few seconds) or loads it from numba's cache; import it where
-it is used. The kernels go row by row with the same instructions, so a row has the same result,
-bit by bit, alone and in any batch.
+it is used. The kernels compute every row with the same instructions, so a row has the same result,
+bit for bit, alone and in any batch.
 
-`scores` are votes of all pairs of classes, and a bounded confidence that orders equal votes. The
-best class is found without most of the pairs. First a knock-out: every class meets the leader so
-far, and the better one leads. Then the leader meets those it has not met yet, which gives its
-score. Other classes have lost at least once by then: where the leader has lost to none, no other
-can have its votes. Where it has lost, as in a circle of three that beat one another, those with no
-more losses than it are looked at in the same way until none is left that could match it. The next
-places are found likewise among the rest, with what is already known.
+The score of a class is its votes in all pairs, plus a bounded confidence that orders equal votes.
+The best class is found without most of the pairs. First comes a knock-out: each class is compared
+with the leader so far, and the winner leads. Then the leader is compared with the classes it has
+not met, which gives its score. By then every other class has lost at least once. So if the leader
+has not lost, no other class can have as many votes. If it has lost (three classes can beat each
+other in a circle), the classes with no more losses are examined in the same way, until none is left
+that could match it. The next ranks are found in the same way among the rest, with the pairs that
+are already known.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from dynresp.support.compiling import compiled, helper
 LANES = 64
 """Rows of weights are padded with zeros to a multiple of this, so that loops have no remainder."""
 
-# Principal components beyond this are no measurement; their products would leave single precision.
+# Larger principal components are not plausible; their products would overflow single precision.
 _LARGEST = 1e9
-# Rows that share one reading of the projection; their features stay in the first-level cache.
+# Rows for which the projection is read once; their features stay in the first-level cache.
 _BLOCK = 8
 
-# Sums of products may be spread over vector lanes; NaN is respected, since it is looked for.
+# Sums of products may be spread over vector lanes; NaN must keep its meaning, since it is checked.
 _FASTMATH = {"reassoc", "contract", "nsz"}
 
 _ROWS = types.Array(types.float64, 2, "C", readonly=True)
@@ -38,9 +39,9 @@ _VECTOR = types.Array(types.float64, 1, "C", readonly=True)
 
 @helper(fastmath=_FASTMATH)
 def _project(features, projection, offset, reduced):
-    """Principal components of some rows; index of the first row out of range, -1 if none is.
+    """Principal components of some rows; returns the first row out of range, -1 if there is none.
 
-    NaN or infinity among the features reaches every component, be it by 0 * inf = NaN.
+    NaN or infinity in a feature reaches every component, even by 0 * inf = NaN.
     """
     bad = len(features)
     for c in range(len(projection)):
@@ -73,7 +74,7 @@ def _expand(reduced, monomials):
 
 @helper
 def _pair(first, second, classes):
-    """Place of the pair of two classes, in either order, among all pairs."""
+    """Index of a pair of classes, given in either order, among all pairs."""
     low, high = min(first, second), max(first, second)
     return low * (2 * classes - low - 1) // 2 + high - low - 1
 
@@ -92,29 +93,29 @@ def _score(c, classes, decisions):
 
 
 @helper(fastmath=_FASTMATH)
-def _next_best(classes, weights, monomials, decisions, known, losses, scored, placed, scores):
-    """The class of the highest score among those not placed; evaluates what that takes."""
+def _next_best(classes, weights, monomials, decisions, known, losses, scored, ranked, scores):
+    """The class of highest score that has no rank yet; evaluates the pairs that this needs."""
     best = -1
     for c in range(classes):
-        if scored[c] and not placed[c] and (best < 0 or scores[c] > scores[best]):
+        if scored[c] and not ranked[c] and (best < 0 or scores[c] > scores[best]):
             best = c
     while True:
         leader = -1
         for c in range(classes):
-            if not placed[c] and not scored[c] and (leader < 0 or losses[c] < losses[leader]):
+            if not ranked[c] and not scored[c] and (leader < 0 or losses[c] < losses[leader]):
                 leader = c
-        # Votes decide before confidences do: a class with more losses cannot come first.
+        # Votes count before confidences: a class with more losses cannot come first.
         if leader < 0 or (best >= 0 and losses[leader] > losses[best]):
             return best
-        # First the knock-out, then the leader against all. Written as one loop, without helpers
-        # that take arrays: counting their references took most of the time.
+        # First the knock-out, then the leader against all. This is one loop without helpers that
+        # take arrays, because counting references to these took most of the time.
         for step in range(2 * classes):
             knock_out = step < classes
             c = step if knock_out else step - classes
             if c == leader:
                 continue
             if knock_out:
-                if placed[c] or scored[c] or losses[c] > losses[leader]:
+                if ranked[c] or scored[c] or losses[c] > losses[leader]:
                     continue
             elif best >= 0 and losses[leader] > losses[best]:
                 break
@@ -176,7 +177,7 @@ def _rank(features, projection, offset, weights, classes, ranks):
     known = np.empty(len(weights), np.bool_)
     losses = np.empty(classes, np.int64)
     scored = np.empty(classes, np.bool_)
-    placed = np.empty(classes, np.bool_)
+    ranked = np.empty(classes, np.bool_)
     scores = np.empty(classes)
     for start in range(0, len(features), _BLOCK):
         stop = min(start + _BLOCK, len(features))
@@ -188,13 +189,13 @@ def _rank(features, projection, offset, weights, classes, ranks):
             known[:] = False
             losses[:] = 0
             scored[:] = False
-            placed[:] = False
-            for place in range(ranks.shape[1]):
+            ranked[:] = False
+            for position in range(ranks.shape[1]):
                 best = _next_best(
-                    classes, weights, monomials, decisions, known, losses, scored, placed, scores
+                    classes, weights, monomials, decisions, known, losses, scored, ranked, scores
                 )
-                placed[best] = True
-                ranks[n, place] = best
+                ranked[best] = True
+                ranks[n, position] = best
     return -1
 
 
@@ -202,10 +203,10 @@ def _decide(features, projection, offset, weights, decisions):
     """Evaluate all pairs of every row.
 
     Args:
-        features: As for `_rank`, and so are `projection`, `offset` and `weights`.
-        projection: See there.
-        offset: See there.
-        weights: See there.
+        features: As in `_rank`.
+        projection: As in `_rank`.
+        offset: As in `_rank`.
+        weights: As in `_rank`.
         decisions: Out, (n, pairs) in the precision of `weights`.
 
     Returns:
@@ -224,8 +225,8 @@ def _decide(features, projection, offset, weights, decisions):
     return -1
 
 
-def _count(classes, decisions, scores):
-    """Scores of all classes of every row, as scikit-learn's `decision_function` has them.
+def _score_all(classes, decisions, scores):
+    """Scores of all classes of every row, as in scikit-learn's `decision_function`.
 
     Args:
         classes: Number of classes.
@@ -258,8 +259,8 @@ decision_kernels = {
 """See `_decide`, by the precision of `weights`."""
 score_kernels = {
     dtype: compiled(types.void(types.int64, types.Array(scalar, 2, "C"), types.float64[:, ::1]))(
-        _count
+        _score_all
     )
     for dtype, _, scalar in _PRECISIONS
 }
-"""See `_count`, by the precision of `decisions`."""
+"""See `_score_all`, by the precision of `decisions`."""

@@ -1,9 +1,9 @@
-"""What a classifier is told of a hit: states of some bodies just after it.
+"""Features of a hit, from which a classifier predicts: states of some bodies after contact.
 
 Zordan et al. 2007 (section 4.2): positions, orientations and velocities of the bodies along the
-spine and of the feet, with those of the centre of mass, in slices of a tenth of a second from the
-contact on. All are seen from where the character stood at contact: the origin is on the ground
-below its pelvis, X points where the pelvis faced (`windows.facing_frames`), Z points up.
+spine and of the feet, and position and velocity of the centre of mass, in slices of a tenth of a
+second from contact on. The frame of reference is where the character stood at contact: the origin
+is on the ground below its pelvis, X points where the pelvis faced (`windows.facing_frames`), Z up.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import MotionError, UsageError
 
 SLICES_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
-"""Times after contact at which states are recorded [s]. The paper records the first four; the
-alignment of a reaction looks half a second ahead at least, so two more cost nothing."""
+"""Times after contact at which states are recorded [s]. The paper records the first four. An
+alignment needs at least half a second of look-ahead, so two more cost nothing."""
 
 PAPER_SLICES_S = SLICES_S[:4]
-"""Those of the paper."""
+"""The times of the paper [s]."""
 
 BODIES = ("pelvis", "abdomen", "chest", "head", "left_foot", "right_foot")
 """Bodies along the spine, and the feet."""
 
 Vector: TypeAlias = Literal["large", "small"]
 VECTORS: tuple[str, ...] = get_args(Vector)
-"""The two feature vectors: all states of the bodies; a few, with the centre of mass."""
+"""The two feature vectors: all states of the bodies, or a few and the centre of mass."""
 
 _STATE = ("position", "orientation", "velocity", "angular_velocity")
 _COM = "com"
 _COM_STATE = ("position", "velocity")
 _AXES = "xyz"
-# The small vector, picked by hand: where feet and centre of mass start from, what the blow does to
-# speed and lean at once, and where balance goes. At 5,500 samples these twenty tell reactions
-# apart as well as the large vector does.
+# The small vector, selected by hand: where feet and centre of mass are at first, how the hit
+# changes speed and lean at once, and how balance develops. With 5,500 samples these twenty features
+# predict as well as the large vector.
 _SMALL = {
     "0.0": (
         "com/velocity_x",
@@ -83,22 +83,22 @@ def _names() -> tuple[str, ...]:
 
 
 FEATURE_NAMES = _names()
-"""Names of all features in their order: "time after contact [s]/body/quantity_axis". Positions are
-those of centres of mass [m], orientations rotation vectors [rad] from the rest pose, velocities in
-m/s and rad/s; "com" is the centre of mass of the whole character."""
+"""Names of all features in order: "time after contact [s]/body/quantity_axis". Positions are those
+of centres of mass [m]; orientations are rotation vectors from the rest pose [rad]; velocities are
+in m/s and rad/s. "com" is the centre of mass of the whole character."""
 
 
 VERSION = 1
-"""Of what the names stand for: raised when a feature of the same name means something else."""
+"""Version of the meaning of the names: raised when a feature changes but keeps its name."""
 
 
 def identity() -> str:
-    """Short hash of what the features are; other features have another."""
+    """Short hash of names and version; other features have another one."""
     return hashlib.sha256(" ".join([str(VERSION), *FEATURE_NAMES]).encode()).hexdigest()[:16]
 
 
 def slice_frames(fps: float) -> npt.NDArray[np.intp]:
-    """Frames after contact that are nearest to the slices."""
+    """Frames after contact that are nearest to the slices (slices,)."""
     return np.round(np.array(SLICES_S) * fps).astype(np.intp)
 
 
@@ -110,15 +110,14 @@ def extract(
     Args:
         character: The character.
         poses: (hits, frames, 59) from contact on.
-        velocities: (hits, frames, 45) likewise, rows of `qvel`.
+        velocities: (hits, frames, 45) rows of `qvel` for the same frames.
         fps: Frame rate [1/s].
 
     Returns:
-        (hits, features), in the order of `FEATURE_NAMES`. Slices that the frames do not reach are
-        NaN.
+        (hits, features) in the order of `FEATURE_NAMES`. Slices after the last frame are NaN.
 
     Raises:
-        MotionError: The shapes do not fit, or there is not a single frame.
+        MotionError: The shapes do not fit, or there is no frame.
     """
     pose = np.asarray(poses, dtype=np.float64)
     rate = np.asarray(velocities, dtype=np.float64)
@@ -144,7 +143,7 @@ def extract(
 def _body(
     character: Character,
 ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray, FloatArray, npt.NDArray[np.intp]]:
-    """What the kernel needs of a character: parents, offsets, centres, shares, bodies told of."""
+    """The kernel's arrays of a character: parents, offsets, centres, mass shares, BODIES."""
     return (
         character.parents.astype(np.int64),
         np.ascontiguousarray(character.offsets),
@@ -157,18 +156,19 @@ def _body(
 def vector_columns(
     vector: str = "large", slices_s: Sequence[float] = PAPER_SLICES_S
 ) -> npt.NDArray[np.intp]:
-    """Which features a classifier takes.
+    """Columns of the features that a classifier takes.
 
     Args:
         vector: "large" for all states of the bodies without the centre of mass (288 in the
-            paper's four slices); "small" for twenty picked by hand, the centre of mass among them.
-        slices_s: Which slices [s].
+            paper's four slices); "small" for twenty features selected by hand, some of them of the
+            centre of mass.
+        slices_s: Slices to use [s], some of `SLICES_S`.
 
     Returns:
         Columns of the features, increasing.
 
     Raises:
-        UsageError: There is no such vector or slice, or the vector holds nothing of the slices.
+        UsageError: There is no such vector or slice, or the vector has no feature in the slices.
     """
     if vector not in VECTORS:
         raise UsageError(f"the feature vector is one of {', '.join(VECTORS)}, got {vector!r}")

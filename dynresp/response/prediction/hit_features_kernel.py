@@ -1,8 +1,8 @@
-"""The compiled features of hits: states of bodies in the slices, from where contact was.
+"""Compiled loop of the features of hits: states of bodies in the slices after contact.
 
 Importing this module compiles it (a second or two) or loads it from numba's cache; import it where
-it is used. Written out joint by joint for one character at a time: a hit alone takes some
-microseconds, where NumPy takes half a millisecond for its calls.
+it is used. It goes joint by joint, one hit at a time: a hit takes some microseconds, while NumPy's
+calls alone take half a millisecond.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SMALL = 5e-7
 
 @helper
 def _write(cosine, sine, vector, features, hit, at):
-    """A vector as seen from the facing at contact."""
+    """Write a vector, turned to the facing at contact."""
     features[hit, at] = cosine * vector[0] + sine * vector[1]
     features[hit, at + 1] = cosine * vector[1] - sine * vector[0]
     features[hit, at + 2] = vector[2]
@@ -42,13 +42,14 @@ def features_kernel(poses, velocities, frames, parents, offsets, centers, shares
     Args:
         poses: (hits, frames, 59) from contact on.
         velocities: (hits, frames, 45) rows of `qvel`.
-        frames: (slices,) frames to tell the state of.
+        frames: (slices,) frames whose states are features.
         parents: (bodies,) -1 for the pelvis; parents before children.
         offsets: (bodies, 3) origin of each in its parent's frame [m].
         centers: (bodies, 3) centre of mass of each in its own frame [m].
-        shares: (bodies,) of the whole mass.
-        chosen: Bodies whose states are told.
-        features: Out, (hits, slices x (12 per body and 6 of the centre of mass)).
+        shares: (bodies,) share of each in the whole mass.
+        chosen: Indices of the bodies whose states are features.
+        features: Out, (hits, features): for each slice 12 for each chosen body, then 6 for the
+            centre of mass.
     """
     bodies, width = len(parents), 12 * len(chosen) + 6
     turn, place = np.empty((bodies, 4)), np.empty((bodies, 3))

@@ -123,7 +123,7 @@ def test_settings_that_differ(classifier: Classifier) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"grouping": "colours"}, "grouping"),
         ({"members": (("left",),)}, "members of other classes"),
@@ -137,8 +137,8 @@ def test_settings_that_differ(classifier: Classifier) -> None:
         ({"feature_names": ()}, "no feature"),
     ],
 )
-def test_parts_that_do_not_fit(classifier: Classifier, changed: Any, said: str) -> None:
-    with pytest.raises(ClassifierError, match=said):
+def test_parts_that_do_not_fit(classifier: Classifier, changed: Any, message: str) -> None:
+    with pytest.raises(ClassifierError, match=message):
         replace(classifier, **changed)
 
 
@@ -193,7 +193,7 @@ def changed(file: Path, out: Path, change: Callable[[dict[str, bytes]], None]) -
     return out
 
 
-def retold(key: str, value: Any) -> Callable[[dict[str, bytes]], None]:
+def changed_key(key: str, value: Any) -> Callable[[dict[str, bytes]], None]:
     """A change of what the file says; without a value, the key goes."""
 
     def change(members: dict[str, bytes]) -> None:
@@ -216,24 +216,24 @@ def rewritten(name: str, array: np.ndarray[Any, Any]) -> Callable[[dict[str, byt
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
-        (lambda m: m.pop("classifier.json"), "no classifier of dynresp"),
-        (retold("format", "a cake"), "no classifier of dynresp"),
-        (retold("format_version", 99), "format version 99"),
-        (retold("features_identity", "0"), "other features"),
-        (retold("classes", None), "damaged"),
-        (retold("classes", ["one"]), "1 classes"),
-        (retold("classes", ["a", "b", 3]), "expected a text"),
-        (retold("classes", ["a", "b", "c", "d"]), "expected"),
-        (retold("components", {"exact": 10**9, "reduced": 2}), "components"),
-        (retold("components", {"exact": True, "reduced": 2}), "components"),
-        (retold("features", ["nonsense"] * 6), "nonsense"),
-        (retold("members", [["left"], ["right"], ["right"]]), "two classes"),
-        (retold("trained_on", {"dataset": "x"}), "damaged"),
-        (retold("trained_for", []), "damaged"),
-        (retold("settings", [1]), "settings"),
-        (retold("facts", {"vector": "large"}), "damaged"),
+        (lambda m: m.pop("classifier.json"), "not a classifier of dynresp"),
+        (changed_key("format", "a cake"), "not a classifier of dynresp"),
+        (changed_key("format_version", 99), "format version 99"),
+        (changed_key("features_identity", "0"), "other features"),
+        (changed_key("classes", None), "damaged"),
+        (changed_key("classes", ["one"]), "1 classes"),
+        (changed_key("classes", ["a", "b", 3]), "expected text"),
+        (changed_key("classes", ["a", "b", "c", "d"]), "expected"),
+        (changed_key("components", {"exact": 10**9, "reduced": 2}), "components"),
+        (changed_key("components", {"exact": True, "reduced": 2}), "components"),
+        (changed_key("features", ["nonsense"] * 6), "nonsense"),
+        (changed_key("members", [["left"], ["right"], ["right"]]), "two classes"),
+        (changed_key("trained_on", {"dataset": "x"}), "damaged"),
+        (changed_key("trained_for", []), "damaged"),
+        (changed_key("settings", [1]), "settings"),
+        (changed_key("facts", {"vector": "large"}), "damaged"),
         (lambda m: m.pop("exact.weights.npy"), "damaged"),
         (rewritten("exact.offset.npy", np.zeros(4)), "exact.offset.npy"),
         (rewritten("exact.offset.npy", np.zeros(5, np.float32)), "exact.offset.npy"),
@@ -247,16 +247,16 @@ def rewritten(name: str, array: np.ndarray[Any, Any]) -> Callable[[dict[str, byt
         (lambda m: m.update({"classifier.json": b"\xff"}), "damaged"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_told(
-    file: Path, tmp_path: Path, change: Callable[[dict[str, bytes]], None], said: str
+def test_the_error_says_what_is_wrong_with_a_file(
+    file: Path, tmp_path: Path, change: Callable[[dict[str, bytes]], None], message: str
 ) -> None:
     wrong = changed(file, tmp_path / "wrong.skops", change)
-    with pytest.raises(ClassifierError, match=said) as caught:
+    with pytest.raises(ClassifierError, match=message) as caught:
         load_classifier(wrong)
     assert str(wrong) in str(caught.value)
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_files_that_are_not_classifiers(tmp_path: Path) -> None:
     with pytest.raises(ClassifierError, match="no such file"):
         load_classifier(tmp_path / "gone.skops")
     with pytest.raises(ClassifierError, match="is a folder"):
@@ -276,7 +276,7 @@ def untrusted(members: dict[str, bytes]) -> None:
 
 
 def needless(members: dict[str, bytes]) -> None:
-    """An object that skops trusts, but that no classifier is made of."""
+    """An object that skops trusts, but that does not belong to a classifier."""
     schema = json.loads(members["schema.json"])
     schema["content"]["exact"]["__class__"] = "DummyClassifier"
     schema["content"]["exact"]["__module__"] = "sklearn.dummy"
@@ -284,7 +284,7 @@ def needless(members: dict[str, bytes]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (untrusted, r"os\.system"),
         (needless, r"sklearn\.dummy\.DummyClassifier"),
@@ -294,10 +294,10 @@ def needless(members: dict[str, bytes]) -> None:
     ],
 )
 def test_pipelines_that_are_not_trusted(
-    file: Path, tmp_path: Path, change: Callable[[dict[str, bytes]], None], said: str
+    file: Path, tmp_path: Path, change: Callable[[dict[str, bytes]], None], message: str
 ) -> None:
     wrong = changed(file, tmp_path / "wrong.skops", change)
-    with pytest.raises(ClassifierError, match=said):
+    with pytest.raises(ClassifierError, match=message):
         load_pipelines(wrong)
 
 
