@@ -31,7 +31,7 @@ def chance_run(
         fps: Frame rate of the motion [1/s].
 
     Raises:
-        DynrespError: There is no way on over the terrain.
+        DynrespError: No step leads on over the terrain.
 
     Example:
         >>> import dynresp

@@ -60,13 +60,13 @@ class GraphTable(Strict):
         Raises:
             UsageError: They contradict each other.
         """
-        said = self.model_dump(exclude={"name", "world"}, exclude_none=True)
-        said["coordinates"] = Coordinates(self.coordinates or _COORDINATES[self.world])
+        given = self.model_dump(exclude={"name", "world"}, exclude_none=True)
+        given["coordinates"] = Coordinates(self.coordinates or _COORDINATES[self.world])
         if self.world == "terrain":
-            said["block_height_m"] = LEVEL_M
+            given["block_height_m"] = LEVEL_M
         if self.blend_s is not None and self.blend_rate_s is None:
-            said["blend_rate_s"] = min(self.blend_s, GraphConfig.blend_rate_s)
-        return GraphConfig(**said)
+            given["blend_rate_s"] = min(self.blend_s, GraphConfig.blend_rate_s)
+        return GraphConfig(**given)
 
 
 class GraphSpec(Strict):

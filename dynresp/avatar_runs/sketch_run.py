@@ -62,7 +62,7 @@ def sketch_run(
 
     Raises:
         UsageError: The arguments contradict each other, or path and goal are missing.
-        DynrespError: There is no way between the obstacles.
+        DynrespError: No path leads between the obstacles.
 
     Example:
         >>> import dynresp
@@ -146,8 +146,8 @@ def _walk(
         walk = reach(search, standing_at(graph, start, goal), goal, world, progress=progress)
     if len(walk.frames) < 2:
         raise DynrespError(
-            f"there is no way on from {start[0]:g},{start[1]:g}: every step would touch an "
-            "obstacle; begin farther from it"
+            f"no step leads on from {start[0]:g},{start[1]:g}: every one would touch an obstacle; "
+            "begin farther from it"
         )
     return walk
 

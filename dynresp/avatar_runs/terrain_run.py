@@ -56,7 +56,7 @@ def terrain_run(
 
     Raises:
         UsageError: The path, goal or start is not on the terrain.
-        DynrespError: There is no way on.
+        DynrespError: No step leads on.
 
     Example:
         ::
@@ -82,7 +82,7 @@ def terrain_run(
     motion = composition.motion
     stands = footing(character, terrain, motion, walk_blocks(walk, graph.config.fps, motion))
     off_height = np.abs(stands.off_height[np.isfinite(stands.off_height)])
-    outcome = "arrived" if walk.arrived else "did not arrive: there is no way on"
+    outcome = "arrived" if walk.arrived else "did not arrive: no step leads on"
     return AvatarRun.of(
         composition,
         graph,

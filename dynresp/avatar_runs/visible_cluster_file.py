@@ -131,9 +131,9 @@ class VideoModel:
         identity = _identity(graph, table, most)
 
         def learn() -> tuple[Clusters, Recogniser]:
-            progress("telling actions apart", 0, 2)
+            progress("learning to recognise actions", 0, 2)
             clusters = find_visible_clusters(graph, most, character)
-            progress("telling actions apart", 1, 2)
+            progress("learning to recognise actions", 1, 2)
             return clusters, Recogniser.trained(database, table, clusters.labels)
 
         clusters, recogniser = _kept(

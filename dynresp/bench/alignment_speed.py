@@ -32,7 +32,7 @@ from dynresp.support.paths import example_specs
 HITS = 300
 """Balls that are thrown."""
 EXAMPLE = "balls_500.toml"
-"""The example experiment that says how, and at whom."""
+"""The example experiment with these balls and the character that they hit."""
 NEAR = 1.02
 """An alignment whose error is within this ratio of the exhaustive one's counts as near."""
 _ROUNDS = 15

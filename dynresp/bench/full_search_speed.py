@@ -164,7 +164,7 @@ def synthetic_track(rng: np.random.Generator, rest: FloatArray, frames: int) -> 
 
 
 class NumpySurface:
-    """The fastest way found to compute all window errors with NumPy to the kernel's accuracy.
+    """The fastest method found to compute all window errors in NumPy to the kernel's accuracy.
 
     Squared distances and quaternion products of all pairs are matrix products in double precision,
     where the cancellation they bring is harmless; square roots and arcsines, which are most of the

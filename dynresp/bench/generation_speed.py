@@ -21,7 +21,7 @@ SAMPLES = 500
 LOOPED = 60
 """Hits that the loop answers."""
 EXAMPLE = "balls_500.toml"
-"""The example experiment that says what hits whom."""
+"""The example experiment with the balls and the character that they hit."""
 
 
 def run(

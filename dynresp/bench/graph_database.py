@@ -32,8 +32,8 @@ def database_of(recorded: MotionDatabase, frames: int, rng: np.random.Generator)
     """A database of a given number of frames.
 
     Args:
-        recorded: Its clips are taken in order. Then they are taken again, each time with other
-            slow deviations of all rotations, as in another performance.
+        recorded: Its clips are used in order. Then they are used again, each time with other slow
+            deviations of all rotations, as in another performance.
         frames: Number of frames.
         rng: Random numbers for the deviations.
     """

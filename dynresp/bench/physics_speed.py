@@ -225,10 +225,10 @@ def _horizon_s(task: Task) -> float:
 def _check_agreement(task: Task, batch: Batch, step_plain: Callable[[FloatArray], None]) -> None:
     """Refuse to report times of sides that do not compute the same, bit by bit."""
     steps = len(task.controls) * task.scene.config.substeps
-    ways = np.empty((len(task.setups), steps, task.states.shape[1]))
-    step_plain(ways)
+    states = np.empty((len(task.setups), steps, task.states.shape[1]))
+    step_plain(states)
     step_batch(task, batch)
-    expected, found = ways[:, -1, 1 : 1 + task.scene.model.nq], batch.bind("qpos")
+    expected, found = states[:, -1, 1 : 1 + task.scene.model.nq], batch.bind("qpos")
     if not np.array_equal(found, expected):
         worst = float(np.max(np.abs(found - expected)))
         raise DynrespError(

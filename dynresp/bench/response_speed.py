@@ -35,7 +35,7 @@ from dynresp.support.paths import example_specs
 HITS = 60
 """Balls that are thrown, with every budget the same."""
 EXAMPLE = "balls_500.toml"
-"""The example experiment that says how, and at whom."""
+"""The example experiment with these balls and the character that they hit."""
 FRAME_MS = 1000.0 / 60.0
 """A frame at 60 a second [ms]."""
 WAITED = 10

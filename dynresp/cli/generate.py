@@ -134,9 +134,9 @@ def _warn(manifest: Mapping[str, Any]) -> None:
     from dynresp.cli.result_text import substitutes_text
 
     for base in manifest["bases"]:
-        said = substitutes_text({"base": base, "library": manifest["library"]})
-        if said:
-            typer.echo(f"dynresp: {said}", err=True)
+        text = substitutes_text({"base": base, "library": manifest["library"]})
+        if text:
+            typer.echo(f"dynresp: {text}", err=True)
             break
 
 

@@ -50,8 +50,8 @@ def watch(
             "--clusters",
             min=2,
             max=12,
-            help="Most actions to distinguish. The more there are, the more often one is taken for "
-            "another.",
+            help="Most actions to distinguish. The more there are, the more often one is mistaken "
+            "for another.",
         ),
     ] = 5,
     seed: Seed = None,

@@ -46,8 +46,8 @@ def make_manifest(
         "shard_size": shard_size,
         "plan": plain(spec),
         "bases": [
-            {"name": base.title, **taken.record, **_motion(taken)}
-            for base, taken in zip(spec.base, bases, strict=True)
+            {"name": base.title, **named.record, **_motion(named)}
+            for base, named in zip(spec.base, bases, strict=True)
         ],
         "library": library_record(library, spec.library.which),
         "character": {"identity": character.identity, "bodies": list(character.body_names)},
@@ -64,9 +64,9 @@ def make_manifest(
     return {**content, "identity": identity_of(content)}
 
 
-def _motion(taken: NamedMotion) -> dict[str, Any]:
-    motion = taken.motion
-    # Rounded, since the last digits may differ from machine to machine; 0.0 takes away -0.
+def _motion(named: NamedMotion) -> dict[str, Any]:
+    motion = named.motion
+    # Rounded, since the last digits may differ from machine to machine; adding 0.0 removes -0.
     poses = (motion.poses.round(4) + 0.0).astype("<f8")
     return {
         "frames": len(motion),

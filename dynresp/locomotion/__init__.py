@@ -1,16 +1,16 @@
-"""Graph-based locomotion: endless, plausible motion out of recorded frames, and its control.
+"""Motion graphs: endless motion made of recorded frames, and the control of avatars on them.
 
-The rooms, in the order in which they build on each other:
+The packages, in the order in which they build on each other:
 
-- `graph`: the lower layer. Recorded frames, the ways between them, and walks through them.
-- `playing`: walks as motion. Jumps blended, brought to a frame rate, the feet fitted.
-- `clusters`: the higher layer. Groups of frames, and what can be reached from each.
-- `choice`: a few actions offered at any moment.
+- `graph`: recorded frames, the jumps between them, and paths through them (the lower layer).
+- `playing`: paths played as motion, with blends at jumps, a frame rate and fitted feet.
+- `clusters`: groups of frames, and which groups can be reached from a frame (the higher layer).
+- `choice`: control by choice, among a few actions offered at any moment.
 - `worlds`: obstacles, mazes, blocks of rough terrain, a step stool, a playground.
-- `sketch`: walks along a path drawn on the ground.
-- `vision`: actions taken from the silhouettes of a person in a video.
-- `avatar`: avatars that are hit on their way, answer, and walk on.
+- `sketch`: control by a path drawn on the ground.
+- `vision`: control by a person in a video, from silhouettes.
+- `avatar`: avatars that are hit during a walk, react, and walk on.
 
-`warping`, dynamic time warping, serves both sketch and vision. The sources are Lee, Chai, Reitsma,
-Hodgins & Pollard 2002 (all rooms) and, for the responder behind `avatar`, the package `response`.
+The source is Lee, Chai, Reitsma, Hodgins & Pollard 2002. The responder of `avatar` is in the
+package `response`.
 """

@@ -1,1 +1,1 @@
-"""TOML files that users write: one reader, one translator of mistakes, fixed and drawn values."""
+"""TOML files that users write: one reader, one translator of errors, fixed and drawn values."""

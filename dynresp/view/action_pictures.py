@@ -54,7 +54,7 @@ def write_action_pictures(
 
     count = len(actions)
     figure = Figure(_SIZE, dpi=_DPI, facecolor="white")
-    _draw_plan(figure.add_axes(_PLAN), [way for way, _ in actions])
+    _draw_plan(figure.add_axes(_PLAN), [path for path, _ in actions])
     for number, (_, pose) in enumerate(actions):
         color = _COLORS[number % len(_COLORS)]
         cell = figure.add_axes(_cell(number, count))
@@ -74,9 +74,9 @@ def write_action_pictures(
         figure.savefig(temporary, format="png")
 
 
-def _draw_plan(axes: Axes, ways: Sequence[FloatArray]) -> None:
+def _draw_plan(axes: Axes, paths: Sequence[FloatArray]) -> None:
     """Draw paths from above, each with its number near its end, where there is room."""
-    points = np.concatenate([way[:, :2] for way in ways])
+    points = np.concatenate([path[:, :2] for path in paths])
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.array(_PLAN[2:]) * _SIZE
     # Metres per inch: all paths with a margin, and at least 1.5 m across.
@@ -88,15 +88,15 @@ def _draw_plan(axes: Axes, ways: Sequence[FloatArray]) -> None:
     axes.tick_params(colors=_FAINT_INK, labelsize=7)
     axes.set_xlabel("x [m]", fontsize=8, color=_FAINT_INK)
     axes.set_ylabel("y [m]", fontsize=8, color=_FAINT_INK)
-    count, arrow = len(ways), _ARROW * scale
-    for number, way in enumerate(ways):
+    count, arrow = len(paths), _ARROW * scale
+    for number, path in enumerate(paths):
         color = _COLORS[number % len(_COLORS)]
         # Where paths coincide, the wider ones show beside those drawn over them.
-        axes.plot(*way[:, :2].T, color=color, lw=1.6 + 1.3 * (count - 1 - number))
-    start = ways[0][0]
+        axes.plot(*path[:, :2].T, color=color, lw=1.6 + 1.3 * (count - 1 - number))
+    start = paths[0][0]
     _arrow(axes, start, 1.2 * arrow, _INK)
     axes.plot(*start[:2], ls="", marker="o", ms=9, mfc="white", mec=_INK, mew=1.5)
-    ends = np.array([way[-1] for way in ways])
+    ends = np.array([path[-1] for path in paths])
     tips = ends[:, :2] + arrow * np.column_stack([np.cos(ends[:, 3]), np.sin(ends[:, 3])])
     occupied = np.concatenate([points, tips, 0.5 * (tips + ends[:, :2])])
     badges = _free_places((ends[:, :2] - corner) / scale, (occupied - corner) / scale, size)

@@ -288,9 +288,9 @@ def _sphere_points(detail: int) -> FloatArray:
     )
     edge = 2.0
     for _ in range(detail):
-        # Neighbours are those about an edge apart; their midpoints are the new corners.
-        apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
-        i, j = np.nonzero(np.triu((apart > 0) & (apart < 1.3 * edge)))
+        # Neighbours are about an edge away; their midpoints are the new corners.
+        away = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        i, j = np.nonzero(np.triu((away > 0) & (away < 1.3 * edge)))
         scale = np.linalg.norm(points[0])
         middle = points[i] + points[j]
         middle *= scale / np.linalg.norm(middle, axis=1, keepdims=True)

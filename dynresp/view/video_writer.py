@@ -1,8 +1,8 @@
 """Video of a story: MuJoCo renders it, ffmpeg makes an MP4 that plays everywhere.
 
-MuJoCo chooses its way of drawing once, when it is imported, and a broken graphics driver can take
-a process down. So a process of its own does the drawing (`dynresp.view.video_worker`), and if it
-fails the next way is tried; this process goes on whatever happens there.
+MuJoCo chooses its renderer once, when it is imported, and a broken graphics driver can crash a
+process. So another process draws (`dynresp.view.video_worker`). If it fails, the next renderer is
+tried; this process goes on.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from dynresp.view.story_moments import camera_yaw
 from dynresp.view.video_worker import PROGRESS
 
 GL_VARIABLE = "MUJOCO_GL"
-# What the user asked for where that was taken out of MuJoCo's sight (dynresp/cli/__init__.py).
+# The user's choice, where dynresp/cli/__init__.py has hidden it from MuJoCo.
 ASKED_VARIABLE = "DYNRESP_GL"
-"""Environment variable by which a user tells MuJoCo how to draw; it is tried first."""
+"""Environment variable with which a user chooses MuJoCo's renderer; it is tried first."""
 
 # A worker that prints nothing for this long [s] hangs in a graphics driver.
 _STALL_S = 60.0
@@ -134,19 +134,19 @@ def _no_space(error: OSError) -> DynrespError:
 def _renderers() -> list[str]:
     """Values of MUJOCO_GL to try, the user's first; "" leaves the choice to MuJoCo."""
     usual = ["egl", "osmesa"] if sys.platform.startswith("linux") else [""]
-    told = os.environ.get(ASKED_VARIABLE) or os.environ.get(GL_VARIABLE, "")
-    return [told, *(way for way in usual if way != told)] if told else usual
+    wanted = os.environ.get(ASKED_VARIABLE) or os.environ.get(GL_VARIABLE, "")
+    return [wanted, *(name for name in usual if name != wanted)] if wanted else usual
 
 
 def _work(
-    script: Path, video: Path, way: str, progress: Callable[[int, int], None] | None
+    script: Path, video: Path, renderer: str, progress: Callable[[int, int], None] | None
 ) -> str | None:
     """Draw in a process of its own; return None, or in a few words why it failed."""
     environment = dict(os.environ)
     environment.pop(GL_VARIABLE, None)
     environment.pop("PYOPENGL_PLATFORM", None)
-    if way:
-        environment[GL_VARIABLE] = way
+    if renderer:
+        environment[GL_VARIABLE] = renderer
     # The worker imports the same dynresp as this process, however that was found.
     package = str(Path(__file__).resolve().parents[2])
     environment["PYTHONPATH"] = os.pathsep.join(
@@ -180,9 +180,9 @@ def _work(
         try:
             for line in process.stdout:
                 watch.cancel()
-                told = re.fullmatch(rf"{PROGRESS} (\d+) (\d+)\s*", line)
-                if told and progress:
-                    progress(int(told[1]), int(told[2]))
+                match = re.fullmatch(rf"{PROGRESS} (\d+) (\d+)\s*", line)
+                if match and progress:
+                    progress(int(match[1]), int(match[2]))
                 watch = threading.Timer(_STALL_S, stop)
                 watch.start()
             code = process.wait()

@@ -129,7 +129,7 @@ class TestFile:
         second = dynresp("graph", "watch", graph, video, *words)
         assert second.exit_code == 0, second.stderr
         assert "drawing silhouettes" not in second.stderr
-        assert "telling actions apart" not in second.stderr
+        assert "learning to recognise actions" not in second.stderr
         assert same(video.parent / "first", tmp_path / "out")
         printed = json.loads(second.stdout)
         assert printed["pace"]["choices"] == 45

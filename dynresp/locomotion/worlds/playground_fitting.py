@@ -314,12 +314,12 @@ def _root(
     half_draw = max(1, round(0.25 * _FOLLOW_S * fps))
     for _ in range(_ROOT_STEPS):
         # Feet and hands that are free go with the root.
-        way = away - weights[..., None] * root[:, None]
-        length = np.linalg.norm(way, axis=-1)
+        left = away - weights[..., None] * root[:, None]
+        length = np.linalg.norm(left, axis=-1)
         short = weights * np.maximum(length - far, 0.0) / np.maximum(length, 1e-9)
         if not (short > 0.0).any():
             break
-        root += smoothing.average((short[..., None] * way).sum(axis=1), half_draw)
+        root += smoothing.average((short[..., None] * left).sum(axis=1), half_draw)
     return root
 
 

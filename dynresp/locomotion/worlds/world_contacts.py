@@ -23,8 +23,8 @@ from dynresp.support.runs import runs
 Ground: TypeAlias = Callable[[FloatArray], FloatArray]
 """Height [m] of the ground at points (..., 2): (...); NaN where there is no ground."""
 
-# The ground under a sole is looked up at this part of the way from its middle to its corners: a toe
-# may stick out over an edge, and an error of the grid may put it into the next block.
+# The ground under a sole is that at this share of the distance from its middle to its corners: a
+# toe may stick out over an edge, and an error of the grid may put it into the next block.
 _INNER = 0.5
 PALM = np.array([0.0, 0.0, -0.35])
 """The middle of a gripping hand, in the forearm's frame [m]."""
@@ -130,7 +130,7 @@ def heights_above(ground: Ground, soles: FloatArray) -> FloatArray:
         soles: (..., points, 3) [m].
 
     Returns:
-        (..., points). The ground is taken half way between each point and the middle of its sole.
+        (..., points). The ground is that half-way between each point and the middle of its sole.
     """
     middle = soles[..., :2].mean(axis=-2, keepdims=True)
     return np.asarray(soles[..., 2] - ground(middle + _INNER * (soles[..., :2] - middle)))
