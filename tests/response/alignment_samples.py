@@ -40,6 +40,6 @@ def align_one(aligner: Aligner, trace: Track, reaction: str | None = None) -> Al
 
 
 def sliding(offset: float, frames: int = 40) -> tuple[Track, ReactionTrack]:
-    """A reaction, and a trace that is the reaction from a frame on that lies between two."""
+    """A reaction, and a trace that is the reaction from `offset` frames on."""
     clip = smooth_track(3, frames)
     return interpolated(clip, offset, FRAMES), ReactionTrack("itself", *clip)

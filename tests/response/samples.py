@@ -14,7 +14,7 @@ from dynresp.response.response import Response
 from dynresp.response.runtime.crowd import Crowd
 from tests.physics.samples import about_y, turned
 
-# A ball so light that nobody feels it.
+# A ball so light that it hardly changes anything.
 FLUFF = {"mass": 0.01, "radius": 0.05}
 
 HITS: list[Impact] = [

@@ -1,4 +1,4 @@
-"""Which classifier an experiment chooses with: shipped, kept, named, or none."""
+"""Who chooses in an experiment: the shipped, the user's own or a given classifier, or none."""
 
 import dataclasses
 from pathlib import Path
@@ -54,7 +54,7 @@ def test_the_shipped_classifier_is_for_the_built_in_library(
     assert classifier is not None
     names = {name for own in classifier.members for name in own}
     assert names | set(classifier.absent) == {r.name for r in builtin.reactions} | {CARRY_ON}
-    # Labelled with the settings that are in force by default.
+    # Trained with the default settings.
     assert classifier.differing_settings(settings_record(ResponseConfig())) == []
 
 
@@ -70,23 +70,25 @@ def test_the_shipped_classifiers_are_for_the_recorded_libraries(
     assert names | set(classifier.absent) == {r.name for r in library.reactions} | {CARRY_ON}
 
 
-def test_it_chooses_by_default(tmp_path: Path) -> None:
+def test_the_classifier_chooses_by_default(tmp_path: Path) -> None:
     run = prepared(tmp_path)
     assert isinstance(run.responder.chooser, ClassifierChooser)
     assert run.record()["choosing"]["budget"] == "fast"
-    (answer,) = run.results(range(1), lambda *told: None)
+    (answer,) = run.results(range(1), lambda *progress: None)
     # The base motion and the reaction that was predicted.
     assert len(answer.response.errors) == 2
     assert answer.response.choice in answer.response.errors
 
 
-def test_the_oracle_chooses_on_request(tmp_path: Path) -> None:
+def test_the_full_search_chooses_with_the_budget_best(tmp_path: Path) -> None:
     run = prepared(tmp_path, choice={"budget": "best"})
     assert isinstance(run.responder.chooser, FullSearchChooser)
     assert run.record()["choosing"] == {"budget": "best"}
 
 
-def test_and_for_want_of_a_classifier(tmp_path: Path, character: Character) -> None:
+def test_the_full_search_chooses_if_there_is_no_classifier(
+    tmp_path: Path, character: Character
+) -> None:
     from tests.experiments.samples import write_world
 
     file = write_world(tmp_path, character)
@@ -97,13 +99,13 @@ def test_and_for_want_of_a_classifier(tmp_path: Path, character: Character) -> N
     assert run.record()["choosing"] == {"budget": "best", "instead_of": "fast"}
 
 
-def test_a_classifier_that_was_kept_comes_before_the_shipped_one(
+def test_the_users_own_classifier_comes_before_the_shipped_one(
     tmp_path: Path, builtin: ReactionLibrary, character: Character
 ) -> None:
     kept = classifier_file(builtin.identity)
     kept.parent.mkdir(parents=True)
     kept.write_bytes(b"damaged")
-    # Nobody named it: what is shipped is taken, and that is said.
+    # It is damaged: the shipped one is used, and the record says so.
     about = prepared(tmp_path).record()["choosing"]
     assert str(kept) in about["passed_over"]
     assert about["budget"] == "fast"
@@ -112,7 +114,7 @@ def test_a_classifier_that_was_kept_comes_before_the_shipped_one(
     assert find_classifier(builtin, character) is not None
 
 
-def test_a_named_classifier_must_be_there_and_fit(tmp_path: Path, character: Character) -> None:
+def test_a_given_classifier_must_exist_and_fit(tmp_path: Path, character: Character) -> None:
     with pytest.raises(ClassifierError, match=r"gone\.skops: no such file"):
         prepared(tmp_path, choice={"classifier": "gone.skops"})
     (tmp_path / "mine.skops").write_bytes(shipped_classifier(BUILTIN).read_bytes())
@@ -121,16 +123,16 @@ def test_a_named_classifier_must_be_there_and_fit(tmp_path: Path, character: Cha
     other = dataclasses.replace(builtin_library(character), identity="another", name="another")
     with pytest.raises(ClassifierError, match="trained for the library 'builtin'"):
         find_classifier(other, character, tmp_path / "mine.skops")
-    # What is shipped is passed over where another library bears the name.
+    # The shipped one is not used where another library has its name.
     assert find_classifier(dataclasses.replace(other, name=BUILTIN), character) is None
 
 
-def test_the_oracle_takes_no_classifier(tmp_path: Path) -> None:
+def test_the_full_search_takes_no_classifier(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="no classifier"):
         prepared(tmp_path, choice={"classifier": "gone.skops", "budget": "best"})
 
 
-def test_other_settings_are_told(tmp_path: Path) -> None:
+def test_settings_other_than_in_training_are_recorded(tmp_path: Path) -> None:
     run = prepared(tmp_path, settings={"window_s": 0.2})
     assert run.record()["choosing"]["classifier"]["other_settings"] == ["window_s"]
 
@@ -148,7 +150,7 @@ def test_the_shipped_file_reads_without_scikit_learn() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_what_is_shipped_holds_no_training_samples() -> None:
+def test_shipped_classifiers_contain_no_training_samples() -> None:
     """Support vectors would be samples of recorded motion."""
     for name in SHIPPED:
         assert load_classifier(shipped_classifier(name)).trained_on.samples > 4000

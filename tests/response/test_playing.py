@@ -1,4 +1,4 @@
-"""What a character plays is changed while it runs: piece by piece, during a hit, after one."""
+"""The motion that a character plays changes at run time: in pieces, during a hit, after one."""
 
 import functools
 import tracemalloc
@@ -33,12 +33,12 @@ def _until(crowd: WatchedCrowd, phase: Phase) -> None:
 
 
 def _steps(motion: Motion) -> float:
-    """The farthest that the root goes between two frames [m]."""
+    """Longest step of the root between two frames [m]."""
     return float(np.linalg.norm(np.diff(motion.poses[:, ROOT], axis=0), axis=1).max())
 
 
 @pytest.mark.parametrize("hit", [HARD, MISS, Ball(1.0, **FLUFF)])
-def test_a_motion_given_piece_by_piece_is_played_as_a_whole(
+def test_a_motion_given_in_pieces_plays_as_if_given_at_once(
     character: Character, library: ReactionLibrary, hit: Ball
 ) -> None:
     whole = walking(character, 20.0, yaw=0.4)
@@ -49,7 +49,7 @@ def test_a_motion_given_piece_by_piece_is_played_as_a_whole(
     fed = 5
     for frame in range(120):
         responder = crowds[1].responders[0]
-        # What comes after a choice is another matter.
+        # Only until a choice: what follows it differs.
         while fed < frame + ahead and not any(event.choice for event in responder.events):
             responder.play(whole.slice(fed, fed + piece), responder.planned_until)
             fed += piece
@@ -65,7 +65,7 @@ def test_a_motion_given_piece_by_piece_is_played_as_a_whole(
 
 
 def _memory_of(work: Callable[[], object]) -> int:
-    """Most memory that some work takes at a time [bytes]; it shows what is copied."""
+    """Largest memory that some work takes [bytes]; it shows what is copied."""
     tracemalloc.start()
     try:
         work()
@@ -107,7 +107,7 @@ def test_a_hit_costs_the_same_however_long_the_base_motion_is(
     assert taken[1] < 1.5 * taken[0]
 
 
-def test_what_is_asked_for_during_the_approach_is_played_after_a_miss(
+def test_a_motion_given_during_the_approach_plays_after_a_miss(
     character: Character, library: ReactionLibrary
 ) -> None:
     base = walking(character, 6.0)
@@ -128,7 +128,7 @@ def test_what_is_asked_for_during_the_approach_is_played_after_a_miss(
     assert _steps(crowd.shown()) < 0.1
 
 
-def test_a_hit_that_is_carried_on_through_goes_on_with_what_was_asked_for_meanwhile(
+def test_after_a_hit_without_reaction_the_motion_given_meanwhile_plays(
     character: Character, library: ReactionLibrary
 ) -> None:
     base = walking(character, 12.0)
@@ -140,7 +140,7 @@ def test_a_hit_that_is_carried_on_through_goes_on_with_what_was_asked_for_meanwh
     for _ in range(200):
         crowd.advance()
     assert [e.choice.name for e in responder.events if e.choice] == ["carry_on"]
-    # It walks on, past what it had at first, from where the hit has left it.
+    # It walks on, beyond its first motion, from where it was after the hit.
     assert crowd.shown().poses[-1, 0] - crowd.shown().poses[100, 0] > 3.0
     assert _steps(crowd.shown()) < 0.1
 

@@ -1,4 +1,4 @@
-"""Responses to hits: base motion, simulation, blend and reaction, each where it belongs."""
+"""Responses to hits: base motion, simulation, blend and reaction, each in its frames."""
 
 import math
 
@@ -35,7 +35,7 @@ def _simulated(character: Character, base: Motion, response: Response) -> tuple[
 
 
 class TestAHit:
-    """What holds of every response to a hit."""
+    """What is true for every response to a hit."""
 
     def test_frames_come_in_order(self, responses: list[Response]) -> None:
         for response in responses:
@@ -50,20 +50,20 @@ class TestAHit:
             assert 3 <= response.exit - response.contact_frame <= 15
             assert response.end - response.exit == 10
 
-    def test_motions_are_sound(self, responses: list[Response]) -> None:
+    def test_motions_are_valid(self, responses: list[Response]) -> None:
         for response in responses:
             poses = response.motion.poses
             assert np.isfinite(poses).all()
             quaternions = poses[:, 3:].reshape(len(poses), 14, 4)
             np.testing.assert_allclose(np.linalg.norm(quaternions, axis=2), 1.0, atol=1e-9)
             assert np.sum(quaternions[1:] * quaternions[:-1], axis=-1).min() > 0.0
-            # No joint leaps: half a turn in a frame would be 94 rad/s.
+            # No joint jumps: half a turn in a frame would be 94 rad/s.
             steps = rotations.angle_between(quaternions[:-1], quaternions[1:])
             assert steps.max() < 1.5
             assert np.abs(np.diff(poses[:, ROOT], axis=0)).max() < 0.3
             assert response.motion.fps == 30.0
 
-    def test_before_the_simulation_it_is_the_base_motion(
+    def test_before_the_simulation_the_base_motion_plays(
         self, responses: list[Response], base: Motion
     ) -> None:
         for response in responses:
@@ -74,25 +74,25 @@ class TestAHit:
             # The simulation begins where the base motion is.
             np.testing.assert_array_equal(response.motion.poses[start], base.poses[start])
 
-    def test_until_the_exit_it_is_the_simulation(
+    def test_the_simulation_plays_until_the_exit(
         self, character: Character, responses: list[Response], base: Motion
     ) -> None:
         for response in responses:
             assert response.exit is not None
             _, trace = _simulated(character, base, response)
             assert trace.contact == response.contact
-            out = response.exit - response.start
+            exit_frame = response.exit - response.start
             part = response.motion.poses[response.start : response.exit]
-            same_poses(part, trace.poses[:out], 1e-12)
+            same_poses(part, trace.poses[:exit_frame], 1e-12)
             if trace.impactor is not None:
                 assert response.impactor is not None
                 shown = response.impactor[response.start : response.exit + 1]
-                np.testing.assert_array_equal(shown, trace.impactor[: out + 1])
+                np.testing.assert_array_equal(shown, trace.impactor[: exit_frame + 1])
 
     def test_the_blend_begins_where_the_simulation_is(
         self, character: Character, responses: list[Response], base: Motion
     ) -> None:
-        """But for what is lifted out of the floor."""
+        """Except for what is raised out of the floor."""
         for response in responses:
             assert response.exit is not None
             _, trace = _simulated(character, base, response)
@@ -106,7 +106,7 @@ class TestAHit:
             # Root, trunk and arms; the legs may be bent out of the floor.
             np.testing.assert_allclose(turned_by[:8], 0.0, atol=1e-9)
 
-    def test_after_the_end_it_is_the_reaction_placed(self, responses: list[Response]) -> None:
+    def test_after_the_end_the_placed_reaction_plays(self, responses: list[Response]) -> None:
         for response in responses:
             assert response.end is not None
             assert response.entry is not None
@@ -114,9 +114,9 @@ class TestAHit:
             rest = response.motion.poses[response.end + 1 :]
             clip = response.entered_motion.poses[response.entry + 11 :][: len(rest)]
             placed = place_on(clip, 0, rest[0])
-            _same_but_for_the_legs(rest, placed)
+            _same_except_the_legs(rest, placed)
 
-    def test_the_reaction_is_entered_where_the_simulation_is_left(
+    def test_the_reaction_is_placed_at_the_exit(
         self, character: Character, responses: list[Response], base: Motion
     ) -> None:
         for response in responses:
@@ -127,7 +127,7 @@ class TestAHit:
             left = trace.poses[response.exit - response.start]
             placed = place_on(response.entered_motion.poses[response.entry :], 0, left)
             rest = response.motion.poses[response.exit + 11 :]
-            _same_but_for_the_legs(rest, placed[11 : 11 + len(rest)])
+            _same_except_the_legs(rest, placed[11 : 11 + len(rest)])
             if response.choice == CARRY_ON:
                 # From there on the base motion alone goes on.
                 same_poses(rest[-1:], placed[[10 + len(rest)]], 1e-7)
@@ -163,7 +163,7 @@ class TestAHit:
         ):
             states = character.kinematics(reaction.motion.poses)
             bounds = (int(windows.starts[0]), int(windows.starts[-1]) + 1)
-            # What is left of it is enough to blend onto and to be seen.
+            # Enough of it follows for the blend, and to be seen.
             assert bounds[1] - 1 <= len(reaction.motion) - config.remaining_s * base.fps + 1e-6
             tracks.append(ReactionTrack(reaction.name, states.centers, states.quaternions, bounds))
         found = window_error.best_match((seen.centers, seen.quaternions), tracks, config.window)
@@ -175,7 +175,7 @@ class TestAHit:
     def test_a_choice_that_fits_is_found(
         self, character: Character, library: ReactionLibrary, base: Motion
     ) -> None:
-        """A reaction made of what the simulation itself does is chosen, and is nearly free."""
+        """A reaction made of the simulation itself is chosen, with hardly any mismatch."""
         plain = Responder(character, library, threads=1).respond([(base, Ball(1.0))])[0]
         _, trace = _simulated(character, base, plain)
         assert trace.contact is not None
@@ -196,7 +196,7 @@ class TestAHit:
 
 
 class TestTheSameBits:
-    """One seed, one result: threads, company and order do not matter."""
+    """One seed, one result: threads, other hits and order do not matter."""
 
     def test_on_any_number_of_threads(
         self,
@@ -224,7 +224,7 @@ class TestTheSameBits:
             assert due == pytest.approx(impact.time)
 
 
-def test_a_response_remembers_what_was_asked(responses: list[Response]) -> None:
+def test_a_response_keeps_its_impact_and_is_read_only(responses: list[Response]) -> None:
     for response in responses:
         assert response.motion.poses.flags.writeable is False
         assert response.prepared.start == response.start
@@ -241,8 +241,8 @@ def test_facing_of_the_reaction_is_that_of_the_character(
         assert abs(math.remainder(float(turn), 2.0 * math.pi)) < 1.0
 
 
-def _same_but_for_the_legs(shown: FloatArray, placed: FloatArray) -> None:
-    """Feet that stand may be held where they are, and the root lowered for them to reach."""
+def _same_except_the_legs(shown: FloatArray, placed: FloatArray) -> None:
+    """Standing feet may be held where they are, and the root lowered so that they reach."""
     np.testing.assert_allclose(shown[:, :2], placed[:, :2], atol=1e-7)
     lowered = placed[:, 2] - shown[:, 2]
     assert lowered.min() > -1e-7

@@ -39,7 +39,7 @@ class TestNothingHappens:
         response = responder.respond([(base, impact)])[0]
         shown = len(response.motion)
         np.testing.assert_array_equal(response.motion.poses, base.poses[:shown])
-        # As far as it goes, or some seconds after the miss.
+        # To its end, or some seconds after the miss.
         assert shown == len(base) or shown > (impact.time + 1.0) * base.fps
         for name in ("contact", "contact_frame", "exit", "end", "choice", "entry", "error"):
             assert getattr(response, name) is None
@@ -73,10 +73,10 @@ class TestNothingHappens:
         shown = min(len(response.motion), len(base))
         same_poses(response.motion.poses[:shown], base.poses[:shown], 0.005)
 
-    def test_a_carried_on_motion_goes_on_by_the_clock(
+    def test_without_reaction_the_base_motion_goes_on_in_time(
         self, character: Character, responder: Responder
     ) -> None:
-        """Swinging the arms on the spot: what is entered is what would have come."""
+        """Swinging the arms on the spot: the entry is the frame that would have come."""
         time = np.arange(151) / 30.0
         swing = about_y(0.7 * np.sin(2.0 * np.pi * 0.8 * time))
         poses = turned(character, {"left_shoulder": swing, "right_shoulder": -swing}, 151)
@@ -93,7 +93,7 @@ class TestNothingHappens:
 
 
 class TestSettings:
-    """What is set is done."""
+    """Settings have their effect."""
 
     def _respond(
         self, character: Character, library: ReactionLibrary, base: Motion, config: ResponseConfig
@@ -117,7 +117,7 @@ class TestSettings:
     def test_a_second_pass_changes_only_what_comes_after_contact(
         self, character: Character, library: ReactionLibrary, base: Motion
     ) -> None:
-        # Late exits, so that there is something to simulate anew.
+        # Late exits, so that there is something to simulate again.
         window = WindowErrorConfig(fps=30.0, exit_min_s=0.4)
         once, twice = (
             self._respond(
@@ -174,11 +174,13 @@ class TestSettings:
     def test_no_hits_no_responses(self, responder: Responder) -> None:
         assert responder.respond([]) == []
 
-    def test_progress_is_told(self, responder: Responder, base: Motion) -> None:
-        told: list[tuple[str, int, int]] = []
-        responder.respond([(base, Ball(1.0)), (base, Push(1.0))], lambda *args: told.append(args))
-        assert {stage for stage, _, _ in told} == {"simulating", "choosing", "finishing"}
-        assert all(0 <= done <= of for _, done, of in told)
+    def test_progress_is_reported(self, responder: Responder, base: Motion) -> None:
+        reports: list[tuple[str, int, int]] = []
+        responder.respond(
+            [(base, Ball(1.0)), (base, Push(1.0))], lambda *args: reports.append(args)
+        )
+        assert {stage for stage, _, _ in reports} == {"simulating", "choosing", "finishing"}
+        assert all(0 <= done <= of for _, done, of in reports)
 
 
 def _survives(make: Callable[[], Response]) -> None:
@@ -235,7 +237,7 @@ class TestEdges:
 
 
 class TestDivergence:
-    """A simulation that blows up is marked, and takes no other down."""
+    """A simulation that diverges is marked, and changes no other."""
 
     @pytest.mark.parametrize("place", [0, 1])
     def test_is_marked(

@@ -1,4 +1,4 @@
-"""The figures against what was put into the motion on purpose."""
+"""The metrics find the faults that were put into a motion."""
 
 import dataclasses
 import math
@@ -31,20 +31,20 @@ seeds = st.integers(0, 2**32 - 1)
 NO_IMPACT = PreparedImpact(ImpactorKind.NONE, 0, 0.0)
 
 
-def _response(motion: Motion, contact: int, leave: int, end: int) -> Response:
-    """A response that departs from neither the simulation nor the reaction."""
+def _response(motion: Motion, contact: int, exit_frame: int, end: int) -> Response:
+    """A response whose poses are those of the simulation and of the reaction."""
     return Response(
         motion,
         0,
         NO_IMPACT,
         contact=Contact(contact / motion.fps, contact, "chest", 1.0, (0.0, 0.0, 0.0)),
         contact_frame=contact,
-        exit=leave,
+        exit=exit_frame,
         end=end,
         choice="itself",
-        entry=leave,
+        entry=exit_frame,
         entered_motion=motion,
-        simulated_after_exit=motion.poses[leave + 1],
+        simulated_after_exit=motion.poses[exit_frame + 1],
         placed_before_end=motion.poses[end - 1],
     )
 
@@ -84,9 +84,7 @@ class TestJointSpeedSteps:
         assert joint_speed_steps(motion).max() < 1e-9
 
     @pytest.mark.parametrize("fps", [30.0, 120.0])
-    def test_a_start_is_found_where_and_as_large_as_it_is(
-        self, character: Character, fps: float
-    ) -> None:
+    def test_a_start_is_found_at_its_frame_and_size(self, character: Character, fps: float) -> None:
         angles = 3.0 * np.maximum(np.arange(20) - 8, 0) / fps
         vectors = np.outer(angles, [0.0, 1.0, 0.0])
         steps = joint_speed_steps(Motion(turned(character, {"neck": vectors}, 20), fps))
@@ -117,7 +115,7 @@ class TestJointSpeedSteps:
 
 
 class TestRootShake:
-    """What a step of the root has more than its neighbours."""
+    """How a step of the root differs from its neighbours."""
 
     @given(seed=seeds, frame=st.integers(1, 16))
     def test_none_for_any_speed_and_acceleration(self, seed: int, frame: int) -> None:
@@ -137,11 +135,11 @@ class TestRootShake:
 
     @pytest.mark.parametrize("frame", [1, 7, 16])
     @pytest.mark.parametrize("shift", [(0.03, 0.0, 0.0), (0.01, -0.02, 0.005)])
-    def test_a_shift_comes_out_as_that_shift(
+    def test_a_shift_is_measured(
         self, character: Character, frame: int, shift: tuple[float, float, float]
     ) -> None:
         poses = walking(character, 0.6, speed=0.0).poses.copy()
-        poses[:, 2] = 0.9  # a steady walk ahead, but for the shift
+        poses[:, 2] = 0.9  # a steady walk ahead, except for the shift
         poses[:, 0] = np.arange(len(poses)) * 0.05
         assert root_shake(Motion(poses, FPS), frame)[0] < 1e-9
         poses[frame + 1 :, :3] += shift
@@ -150,9 +148,7 @@ class TestRootShake:
         assert turn < 1e-6
 
     @pytest.mark.parametrize("degrees", [0.5, 4.0])
-    def test_a_leap_of_orientation_comes_out_as_that_angle(
-        self, character: Character, degrees: float
-    ) -> None:
+    def test_a_jump_of_orientation_is_measured(self, character: Character, degrees: float) -> None:
         poses = standing(character, 0.6).poses.copy()
         steady = rotations.from_yaw(np.arange(len(poses)) * 0.03)
         leap = rotations.from_yaw(np.where(np.arange(len(poses)) > 8, np.radians(degrees), 0.0))
@@ -163,7 +159,7 @@ class TestRootShake:
 
 
 class TestRootJump:
-    """How far the blend departs from what it leaves and joins."""
+    """How far the blend moves the root from simulation and reaction."""
 
     def test_is_the_distance_from_simulation_and_reaction(self, character: Character) -> None:
         motion = walking(character, 2.0)
@@ -227,11 +223,11 @@ class TestMeasure:
         poses[:, 0] += np.arange(len(poses)) * 0.002
         motion = Motion(poses, FPS, contacts=np.ones((len(poses), 2), dtype=bool))
         quality = _measured(_response(motion, 11, 20, 30), character)
-        way = (len(poses) - 1 - 11) * 0.002
-        assert quality.foot_skate_m == pytest.approx(2.0 * way)
-        assert quality.foot_skate_worst_m == pytest.approx(way)
+        distance = (len(poses) - 1 - 11) * 0.002
+        assert quality.foot_skate_m == pytest.approx(2.0 * distance)
+        assert quality.foot_skate_worst_m == pytest.approx(distance)
 
-    def test_the_blend_s_own_skate(self, character: Character) -> None:
+    def test_skates_in_the_blend(self, character: Character) -> None:
         poses = standing(character, 2.0).poses.copy()
         poses[:, 0] += np.cumsum(np.arange(len(poses)) > 24) * 0.002
         motion = Motion(poses, FPS, contacts=np.ones((len(poses), 2), dtype=bool))
@@ -261,12 +257,12 @@ class TestMeasure:
         assert quality.speed_step_reference == pytest.approx(float(reference))
         assert quality.speed_step_ratio == pytest.approx(at / float(reference))
 
-    def test_a_still_motion_has_a_least_reference(self, character: Character) -> None:
+    def test_a_still_motion_has_the_least_reference(self, character: Character) -> None:
         quality = _measured(_response(standing(character), 10, 20, 30), character)
         assert quality.speed_step_reference == 0.1
         assert quality.speed_step_ratio == quality.speed_step_exit / 0.1
 
-    def test_a_motion_left_alone_has_no_fault(self, character: Character) -> None:
+    def test_a_motion_without_faults_has_none(self, character: Character) -> None:
         poses = walking(character, 3.0).moved(0.0, (0.0, 0.0, 0.5)).poses
         quality = _measured(_response(Motion(poses, FPS), 10, 20, 30), character)
         assert quality.speed_step_ratio <= 1.0
@@ -275,7 +271,7 @@ class TestMeasure:
         assert quality.foot_depth_m == quality.body_depth_m == quality.foot_skate_m == 0.0
 
 
-def test_every_figure_is_explained() -> None:
+def test_every_metric_is_explained() -> None:
     text = (Path(__file__).resolve().parents[2] / "docs" / "quality.md").read_text()
     for field in dataclasses.fields(Quality):
         assert f"`{field.name}`" in text

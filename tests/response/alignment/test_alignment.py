@@ -1,3 +1,5 @@
+"""The alignment equals its slow twin: mismatches, slopes, samples and descent."""
+
 import dataclasses
 import math
 from pathlib import Path
@@ -32,10 +34,10 @@ from tests.response.alignment_samples import (
     smooth_track,
 )
 
-# -- errors ------------------------------------------------------------------------------------
+# -- mismatches --------------------------------------------------------------------------------
 
 
-def test_errors_at_whole_frames_are_those_of_the_oracle() -> None:
+def test_mismatches_at_whole_frames_are_those_of_the_full_search() -> None:
     tracks = [
         ReactionTrack("whole", *smooth_track(2, 30, 14)),
         ReactionTrack("late", *flipped(smooth_track(3, 30, 14), 1), entry_range=(7, 20)),
@@ -63,7 +65,7 @@ def test_errors_at_whole_frames_are_those_of_the_oracle() -> None:
     angle_weight=st.floats(0.01, 3.0),
     bodies=st.integers(1, 14),
 )
-def test_errors_between_frames_are_those_of_the_twin(
+def test_mismatches_between_frames_are_those_of_the_twin(
     seed: int,
     exit_frame: float,
     entry_frame: float,
@@ -81,7 +83,7 @@ def test_errors_between_frames_are_those_of_the_twin(
     assert float(found) == pytest.approx(expected, rel=1e-4, abs=ERROR_FLOOR)
 
 
-def test_errors_of_lying_and_upside_down_pelvises() -> None:
+def test_mismatches_of_pelvises_that_lie_or_are_upside_down() -> None:
     trace, clip = smooth_track(1), smooth_track(2, 24)
     for flip in ((math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0), (0.0, 1.0, 0.0, 0.0)):
         for _, quaternions in (trace, clip):
@@ -144,9 +146,9 @@ def test_samples_are_those_of_the_twin(seed: int, sets_without_gain: int) -> Non
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_descent_stays_in_the_box_and_gets_as_low_as_scipy(seed: int) -> None:
+def test_a_descent_stays_within_bounds_and_gets_as_low_as_scipy(seed: int) -> None:
     (positions, quaternions), track = sliding(2.35 + 0.7 * seed)
-    # Like the reaction, but for other movements of the bodies.
+    # Like the reaction, with other movements of the bodies added.
     trace = 0.8 * positions + 0.2 * smooth_track(seed)[0], quaternions
     start = twin.sample(trace, track, WINDOW, AlignmentConfig())
     found = align_one(Aligner([track], WINDOW), trace)
@@ -170,7 +172,7 @@ def test_a_descent_stays_in_the_box_and_gets_as_low_as_scipy(seed: int) -> None:
     step=st.floats(1 / 60, 1.0),
     sets_without_gain=st.integers(1, 9),
 )
-def test_refinement_never_loses_and_more_starts_never_hurt(
+def test_descent_and_more_starts_never_make_the_mismatch_larger(
     seed: int, starts: int, step: float, sets_without_gain: int
 ) -> None:
     config = AlignmentConfig(step, sets_without_gain, starts)
@@ -220,8 +222,10 @@ def test_placing_either_track_elsewhere_changes_nothing(
 
 @pytest.mark.slow
 @pytest.mark.mocap
-def test_alignments_of_real_hits_are_nearly_exhaustive(motions_folder: Path) -> None:
-    """Within 2 % of the exhaustive alignment in 95 % of cases."""
+def test_alignments_of_real_hits_are_nearly_as_good_as_the_full_search(
+    motions_folder: Path,
+) -> None:
+    """Within 2 % of the full search in 95 % of cases."""
     cases = bench.simulated(11, 400, motions_folder)
     assert "core" in cases.about
     library = library_windows(cases.tracks, cases.window)

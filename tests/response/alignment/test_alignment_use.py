@@ -1,3 +1,5 @@
+"""The alignment in use: growing traces, whole exits, many traces, and input that is refused."""
+
 import dataclasses
 import math
 import pickle
@@ -25,9 +27,9 @@ from tests.response.alignment_samples import (
 # -- sets, and traces that grow ----------------------------------------------------------------
 
 
-def test_sampling_is_cut_where_further_sets_do_not_improve() -> None:
+def test_sampling_ends_where_further_sets_do_not_improve() -> None:
     trace, track = sliding(6.0)
-    # The first set holds a perfect match.
+    # The first set has a perfect match.
     for sets_without_gain in (1, 2, 3):
         config = AlignmentConfig(sets_without_gain=sets_without_gain)
         found = align_one(Aligner([track], WINDOW, config), trace)
@@ -59,7 +61,7 @@ def test_a_trace_may_grow_until_the_search_is_complete() -> None:
     assert complete
 
 
-def test_what_a_trace_holds_after_the_last_window_is_not_looked_at() -> None:
+def test_frames_after_the_last_window_are_ignored() -> None:
     aligner = Aligner(reactions(2), WINDOW)
     trace = smooth_track(1, FRAMES + 4)
     whole = align_one(aligner, (trace[0][:FRAMES], trace[1][:FRAMES]))
@@ -68,7 +70,7 @@ def test_what_a_trace_holds_after_the_last_window_is_not_looked_at() -> None:
 
 
 def test_one_exit_and_few_entries() -> None:
-    """As for carrying on with the base motion: one exit, entries around the clock's."""
+    """As for no reaction (carry on): one exit, and entries around it."""
     window = dataclasses.replace(WINDOW, exit_min_s=0.25, exit_max_s=0.25)
     trace = smooth_track(1)
     base = ReactionTrack("base", *interpolated(trace, 4.7, 11), entry_range=(0, 7))
@@ -93,7 +95,7 @@ def test_snapping_shifts_exit_and_entry_together(seed: int) -> None:
     assert whole.exit_frame in (math.floor(found.exit_frame), math.ceil(found.exit_frame))
     shifted = found.entry_frame + whole.exit_frame - found.exit_frame
     shifted = min(max(shifted, 0.0), 19.0)
-    # The entry follows the exit, and is looked for again close by.
+    # The entry moves with the exit, and then to the best one close by.
     assert abs(whole.entry_frame - shifted) <= 1.0
     there = aligner.errors(*trace, whole.reaction, whole.exit_frame, shifted)
     assert whole.error <= float(there) + 1e-6
@@ -104,7 +106,7 @@ def test_snapping_shifts_exit_and_entry_together(seed: int) -> None:
     assert again.error <= whole.error + 1e-6
 
 
-def test_snapping_takes_the_better_frame_and_holds_the_entry_in_its_bounds() -> None:
+def test_snapping_takes_the_better_frame_and_keeps_the_entry_within_its_bounds() -> None:
     trace, track = sliding(0.0)
     aligner = Aligner([track], WINDOW)
     found = Alignment("itself", 1.0, 6.2, 6.2, 0, 1, True, True)
@@ -122,7 +124,7 @@ def test_snapping_takes_the_better_frame_and_holds_the_entry_in_its_bounds() -> 
 # -- many at once ------------------------------------------------------------------------------
 
 
-def test_many_are_bitwise_what_they_are_one_by_one() -> None:
+def test_many_have_the_bits_that_each_has_alone() -> None:
     aligner = Aligner(reactions(20, 21, 22), WINDOW)
     traces = [smooth_track(seed) for seed in range(16)]
     rows = np.random.default_rng(0).integers(0, 3, size=(16, 2))
@@ -134,9 +136,9 @@ def test_many_are_bitwise_what_they_are_one_by_one() -> None:
     many = aligner.align_many(*stacked, rows)
     first = aligner.align_many(*stacked, rows[:, 0])
     with ThreadPoolExecutor(4) as pool:
-        apart = list(pool.map(alone, range(16)))
+        each = list(pool.map(alone, range(16)))
     assert many.errors.shape == (16, 2)
-    for n, found in enumerate(apart):
+    for n, found in enumerate(each):
         for k, one in enumerate(found):
             assert one.reaction == many.names[many.rows[n, k]]
             assert one.error == many.errors[n, k]
@@ -159,7 +161,7 @@ def test_rows_that_do_not_fit_are_refused() -> None:
             aligner.align_many(*trace, rows)
 
 
-def test_an_aligner_travels_to_other_processes() -> None:
+def test_an_aligner_can_be_pickled() -> None:
     aligner = Aligner(reactions(20), WINDOW)
     again = pickle.loads(pickle.dumps(aligner))
     assert align_one(again, smooth_track(1)) == align_one(aligner, smooth_track(1))
@@ -242,7 +244,7 @@ def test_frames_and_names_out_of_bounds_are_refused() -> None:
     assert aligner.errors(*trace, "a", [], []).shape == (0,)
 
 
-def test_libraries_that_make_no_sense_are_refused() -> None:
+def test_unusable_libraries_are_refused() -> None:
     track = reactions(1)[0]
     with pytest.raises(MotionError, match="empty"):
         Aligner([], WINDOW)

@@ -1,4 +1,4 @@
-"""The landscape of an alignment: what was chosen lies on it, at the error that was told."""
+"""The error surface of a response has the choice on it, with the mismatch that was reported."""
 
 import numpy as np
 import pytest
@@ -53,25 +53,25 @@ def responses(
     return chosen
 
 
-def test_the_choice_lies_on_the_grid(responses: list[Response], character: Character) -> None:
+def test_the_choice_is_on_the_grid(responses: list[Response], character: Character) -> None:
     for response in responses:
         assert response.exit is not None
         assert response.contact_frame is not None
         assert response.entry is not None
         found = alignment_surface(response, character, CONFIG)
         assert found.errors.shape == (len(found.exits_s), len(found.entries_s))
-        apart = np.abs(found.exits_s - (response.exit - response.contact_frame) / 30.0)
-        beside = np.abs(found.entries_s - response.entry / 30.0)
-        assert max(apart.min(), beside.min()) < 1e-9
-        told = found.errors[apart.argmin(), beside.argmin()]
-        # Between frames the clip read later is nearly, not quite, what the alignment compared.
-        assert told == pytest.approx(response.error, rel=0.02, abs=1e-3)
+        exit_gaps = np.abs(found.exits_s - (response.exit - response.contact_frame) / 30.0)
+        entry_gaps = np.abs(found.entries_s - response.entry / 30.0)
+        assert max(exit_gaps.min(), entry_gaps.min()) < 1e-9
+        error = found.errors[exit_gaps.argmin(), entry_gaps.argmin()]
+        # Between frames, the sampled clip is nearly, not quite, what the alignment compared.
+        assert error == pytest.approx(response.error, rel=0.02, abs=1e-3)
 
 
 def test_a_reaction_goes_on_from_between_its_frames(
     responses: list[Response], character: Character
 ) -> None:
-    """After the blend the motion is the clip, read from the entry that was told."""
+    """After the blend the motion is the clip, sampled from the entry on."""
     for response in responses:
         if response.choice == CARRY_ON:
             continue
@@ -83,11 +83,11 @@ def test_a_reaction_goes_on_from_between_its_frames(
         clip = library.reaction(str(response.choice)).motion
         late = response.entry + (response.end - response.exit)
         frames = min(10, len(clip) - 1 - int(np.ceil(late)))
-        asked = clip.sample((late + np.arange(frames)) / clip.fps)
+        sampled = clip.sample((late + np.arange(frames)) / clip.fps)
         shown = response.motion.poses[response.end : response.end + frames]
-        # But for the legs, whose feet may be held where they stand.
+        # Except the legs: feet may be held where they stand.
         upper = slice(7, 7 + 4 * character.joint("left_hip"))
-        expected = place_on(asked, 0, shown[0])
+        expected = place_on(sampled, 0, shown[0])
         np.testing.assert_allclose(expected[:, upper], shown[:, upper], atol=1e-9)
 
 

@@ -1,4 +1,4 @@
-"""Labelled hits: what the responder would have done, and the same alone as together."""
+"""Labels of hits are the choices of the responder; each hit has the bits that it has alone."""
 
 from dataclasses import fields
 
@@ -68,7 +68,7 @@ def test_a_miss_is_a_miss(labelled: HitLabels) -> None:
     assert labelled.contact_body[-1] == labelled.contact_frame[-1] == -1
 
 
-def test_each_is_bitwise_what_it_would_be_alone(
+def test_each_has_the_bits_that_it_has_alone(
     labeller: HitLabeller, labelled: HitLabels, hits: list[tuple[Motion, Impact]], base: Motion
 ) -> None:
     every = [*hits, (base, MISS)]
@@ -80,5 +80,5 @@ def test_each_is_bitwise_what_it_would_be_alone(
             )
 
 
-def test_nothing_is_labelled_where_nothing_is_given(labeller: HitLabeller) -> None:
+def test_no_hits_give_no_labels(labeller: HitLabeller) -> None:
     assert len(labeller.label([]).label) == 0
