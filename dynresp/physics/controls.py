@@ -1,6 +1,6 @@
-"""What acts on a simulation from step to step: servo targets, forces, and what holds or draws.
+"""Packs what acts on a simulation in each step: servo targets, push forces, targets of welds.
 
-Packed into the rows that `mujoco.batch.Batch.rollout` sets before every step.
+`mujoco.batch.Batch.rollout` sets one row before every step.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Controls:
     """
 
     def __init__(self, scene: Scene) -> None:
-        """Find out where everything lies in a row, and when each target is read."""
+        """Find the columns of a row, and the time at which each target is read."""
         self.spec = int(sum(int(part) for part in _PARTS))
         self._fps = scene.config.fps
         self._substeps = scene.config.substeps
@@ -49,22 +49,23 @@ class Controls:
             columns.append(slice(start, start + size))
             start += size
         self._size = start
-        self._servos, self._wrenches, self._welds, self._places, self._turns = columns
+        self._servos, self._wrenches, self._welds, self._positions, self._turns = columns
         self.hold = self._welds.start + scene.hold_weld
         self._hold_target = self._target(scene.hold_mocap)
         self._strike_target = self._target(scene.strike_mocap or 0)
         self._steps = np.arange(self._substeps) / self._substeps
-        # Every simulation is at a whole frame, so these are the same for all.
-        lead = servo_gains(scene.character, scene.config.servo).lead_s * self._fps
+        # Fractional frames at which targets are read, counted from a whole frame: the same for all
+        # simulations.
+        lead = servo_gains(scene.character).lead_s * self._fps
         self._joints_at = self._steps[:, None] + lead
         self._hold_at = self._steps + HOLD_LEAD_S * self._fps
         latest = max(self._joints_at.max(), self._hold_at.max())
         self.read_ahead = int(np.floor(latest)) + 2
 
     def _target(self, mocap: int) -> tuple[slice, slice]:
-        """Columns of a mocap body's position and orientation."""
-        place, turn = self._places.start + 3 * mocap, self._turns.start + 4 * mocap
-        return slice(place, place + 3), slice(turn, turn + 4)
+        """Columns of the position and the orientation of a mocap body."""
+        first, turn = self._positions.start + 3 * mocap, self._turns.start + 4 * mocap
+        return slice(first, first + 3), slice(turn, turn + 4)
 
     def pack(
         self,
@@ -78,9 +79,9 @@ class Controls:
 
         Args:
             impacts: What hits in each simulation.
-            frames: The frame that each is in, counted from its start.
+            frames: The present frame of each, counted from its start.
             targets: For each, (frames, 59) poses to track; after the last, the last holds.
-            target_frames: Where each is in its targets.
+            target_frames: The present frame of each in its targets.
             held: Whether each pelvis is held to its target.
 
         Returns:
@@ -95,13 +96,13 @@ class Controls:
                 for target, at in zip(targets, target_frames, strict=True)
             ]
         )
-        # The servo normalises its target, so a straight line between two poses will do.
+        # The servo normalises its target, so linear interpolation between poses is enough.
         joints = near[..., JOINTS].reshape(*near.shape[:2], -1, 4)
         controls[..., self._servos] = between(joints, self._joints_at).reshape(
             len(near), self._substeps, -1
         )
-        place, turn = self._hold_target
-        controls[..., place] = between(near[..., ROOT], self._hold_at)
+        position, turn = self._hold_target
+        controls[..., position] = between(near[..., ROOT], self._hold_at)
         controls[..., turn] = rotations.normalize(between(near[..., ROOT_QUAT], self._hold_at))
         for row, impact, frame in zip(controls, impacts, frames, strict=True):
             self._hit(row, impact, frame + self._steps)
@@ -116,17 +117,17 @@ class Controls:
         if impact.strike_poses is not None:
             drawn = at + STRIKE_LEAD_S * self._fps
             pose = between(impact.strike_poses[None], drawn)[0]
-            place, turn = self._strike_target
-            row[:, place] = pose[:, :3]
+            position, turn = self._strike_target
+            row[:, position] = pose[:, :3]
             row[:, turn] = rotations.normalize(pose[:, 3:])
 
 
 def between(rows: FloatArray, at: FloatArray) -> FloatArray:
-    """Rows at fractional indices, along straight lines; the last row holds after the end.
+    """Rows at fractional indices, by linear interpolation; the last row holds after the end.
 
     Args:
-        rows: (simulations, frames, n), or (simulations, frames, joints, n) where each joint is
-            read at times of its own.
+        rows: (simulations, frames, n), or (simulations, frames, joints, n) if each joint is read
+            at its own times.
         at: (steps,), or (steps, joints).
 
     Returns:

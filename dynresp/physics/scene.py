@@ -1,40 +1,41 @@
 """The world in which a hit is simulated: floor, character with servos, and what hits it.
 
-Composed with MjSpec from the files in `models/`. The character comes first, so the first 59
-numbers of `qpos` and the first 45 of `qvel` are a pose and a velocity of the character, and the
-first 52 controls are the joint part of the pose that the servos track.
+It is composed with MjSpec from the files in `models/`. The character comes first, so the first 59
+numbers of `qpos` and the first 45 of `qvel` are its pose and velocity, and the first 52 controls
+are the joint part of the pose that the servos track.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 import mujoco
 import numpy as np
 
 from dynresp.motion.character import Character
-from dynresp.physics.servo import ServoConfig, add_servos
+from dynresp.physics.servo import add_servos
 from dynresp.support import paths
-from dynresp.support.errors import UsageError
+from dynresp.support.checks import check_number
 
 PREFIX = "character/"
 IMPACTOR_PREFIX = "impactor/"
-# The weld that holds the pelvis to the base motion is this stiff: time constant [s], damping ratio.
+# Stiffness of the weld that holds the pelvis to the base motion: time constant [s], damping ratio.
 _HOLD_SOLREF = (0.01, 1.0)
-# The weld that draws a striking arm along its recorded path gives a little, as a shoulder does.
+# The weld that draws a striking arm along its recorded path is softer, like a shoulder.
 _STRIKE_SOLREF = (0.012, 1.0)
-# A weld damps the speed against its target, which to MuJoCo stands still; reading the target this
-# much ahead cancels the lag. From solref, damping over stiffness is 2 x time constant x ratio^2.
+# A weld damps the speed relative to its target, which MuJoCo takes to stand still. Targets are read
+# this much ahead [s], which cancels the lag. From solref, damping over stiffness is
+# 2 x time constant x ratio^2.
 HOLD_LEAD_S = 2.0 * _HOLD_SOLREF[0] * _HOLD_SOLREF[1] ** 2
 STRIKE_LEAD_S = 2.0 * _STRIKE_SOLREF[0] * _STRIKE_SOLREF[1] ** 2
 
 
 class ImpactorKind(Enum):
-    """What the scene holds beside the character."""
+    """What a scene contains besides the character."""
 
     NONE = "none"
-    """Nothing: pushes are forces."""
+    """Nothing; pushes are forces."""
     PROJECTILE = "projectile"
     """A sphere of any mass and size: a ball, or a fist."""
     STRIKER = "striker"
@@ -43,34 +44,29 @@ class ImpactorKind(Enum):
 
 @dataclass(frozen=True)
 class PhysicsConfig:
-    """How the simulation runs.
+    """Settings of the simulation.
 
     Attributes:
-        fps: Frame rate [1/s] at which it is told what to track, and seen.
-        substeps: Steps of the simulation in a frame. With MuJoCo's `discrete` integrator 8 at
-            30 fps (4.2 ms) come as close to the limit of small steps as 16 with `implicitfast`, in
-            0.6 of the time.
-        servo: Gains of the servos.
+        fps: Frames a second [1/s], 1 to 1000: the rate of base motions, targets and results.
+        substeps: Steps of the simulation in each frame, 1 to 1000. With MuJoCo's `discrete`
+            integrator 8 steps at 30 fps (4.2 ms) come as close to the limit of small steps as 16
+            with `implicitfast`, in 0.6 of the time.
+
+    Raises:
+        UsageError: A number is out of its range.
     """
 
     fps: float = 30.0
     substeps: int = 8
-    servo: ServoConfig = field(default_factory=ServoConfig)
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            UsageError: The frame rate or the number of substeps makes no sense.
-        """
-        if not 1.0 <= self.fps <= 1000.0:
-            raise UsageError(f"fps must be from 1 to 1000, got {self.fps}")
-        if not 1 <= self.substeps <= 1000:
-            raise UsageError(f"substeps must be from 1 to 1000, got {self.substeps}")
+        """Check the numbers."""
+        check_number("fps", self.fps, 1.0, 1000.0)
+        check_number("substeps", self.substeps, 1, 1000, whole=True)
 
     @property
     def timestep(self) -> float:
-        """Step of the simulation [s]."""
+        """Length of a step of the simulation [s]."""
         return 1.0 / (self.fps * self.substeps)
 
 
@@ -80,11 +76,11 @@ class Scene:
     Attributes:
         model: The MuJoCo model.
         character: The character in it.
-        kind: What it holds beside the character.
-        config: How it runs.
-        hold_mocap: Index of the mocap body to which the pelvis is held.
-        strike_mocap: Index of the one that draws a striking arm; None without one.
-        hold_weld: Index of the equality that holds it.
+        kind: What it contains besides the character.
+        config: Settings of the simulation.
+        hold_mocap: Index of the mocap body that holds the pelvis.
+        strike_mocap: Index of the mocap body that draws a striking arm; None without a strike.
+        hold_weld: Index of the equality that holds the pelvis.
         contact_bodies: Names of the character's bodies in the order of the contact sensors.
     """
 
@@ -107,7 +103,7 @@ class Scene:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         ragdoll = mujoco.MjSpec.from_file(str(self.character.file))
         spec.attach(ragdoll, prefix=PREFIX, frame=spec.worldbody.add_frame())
-        add_servos(spec, self.character, self.config.servo, PREFIX)
+        add_servos(spec, self.character, PREFIX)
         spec.worldbody.add_body(name="hold", mocap=True)
         self._weld(spec, "hold", f"{PREFIX}pelvis", _HOLD_SOLREF)
         if self.kind is ImpactorKind.PROJECTILE:
@@ -142,7 +138,7 @@ class Scene:
         weld.data = data
 
     def _add_contact_sensors(self, spec: mujoco.MjSpec, impactor: str) -> None:
-        """One sensor a body: is it touched by the impactor, how hard [N], and where."""
+        """Add a sensor for each body: whether the impactor touches it, its force [N], and where."""
         fields = (
             mujoco.mjtConDataField.mjCONDATA_FOUND,
             mujoco.mjtConDataField.mjCONDATA_FORCE,

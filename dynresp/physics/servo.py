@@ -1,4 +1,4 @@
-"""The servos: one orientation servo a ball joint, its gains scaled by the inertia it moves.
+"""The servos: one orientation servo for each ball joint; gains follow from the inertia it moves.
 
 MuJoCo's orientation servo applies the torque kp log(q^-1 q_target) - kv omega in the child's frame
 and takes the target as a quaternion, so a row of controls is the joint part of a pose.
@@ -7,75 +7,58 @@ and takes the target as a quaternion, so a row of controls is the joint part of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.errors import UsageError
 
+FREQUENCY = 40.0
+"""Natural frequency [rad/s]; stiffness is the inertia felt times its square (Zordan et al. 2007,
+section 6.1: inertia-scaled PD servos)."""
 
-def _torque_limits() -> Mapping[str, float]:
-    return MappingProxyType(
-        {
-            "waist": 400.0,
-            "back": 300.0,
-            "neck": 60.0,
-            "shoulder": 120.0,
-            "elbow": 90.0,
-            "hip": 350.0,
-            "knee": 300.0,
-            "ankle": 220.0,
-        }
-    )
+DAMPING_RATIO = 1.0
+"""1 is critical damping."""
 
+STIFFNESS_FLOORS: Mapping[str, float] = MappingProxyType({"knee": 2000.0, "ankle": 700.0})
+"""Least stiffness [N m/rad] by joint without its side. What knees and ankles move is light, but
+they carry the body. Both ankles together must exceed its weight times the height of its centre of
+mass (73 kg x 9.81 m/s2 x 0.9 m = 640 N m/rad), or it topples like a pole. If a bent knee gives way,
+the toe of the other foot hits the ground."""
 
-def _stiffness_floors() -> Mapping[str, float]:
-    return MappingProxyType({"knee": 2000.0, "ankle": 700.0})
+TORQUE_LIMITS: Mapping[str, float] = MappingProxyType(
+    {
+        "waist": 400.0,
+        "back": 300.0,
+        "neck": 60.0,
+        "shoulder": 120.0,
+        "elbow": 90.0,
+        "hip": 350.0,
+        "knee": 300.0,
+        "ankle": 220.0,
+    }
+)
+"""Largest torque [N m] by joint without its side: about one and a half times that of a strong man,
+since a servo stands for the muscles on both sides of a joint."""
 
-
-# Part of the damping that the joint has by itself. MuJoCo integrates a joint's own damping
-# implicitly but a saturated servo's explicitly; a servo that damps more than twice what the joint
-# does can then drive a light turn, such as a thigh's about its own axis, to and fro.
+# Part of the damping that belongs to the joint itself. MuJoCo integrates a joint's own damping
+# implicitly, but a saturated servo's explicitly. A servo with more than twice the damping of the
+# joint can then make a light rotation oscillate, such as that of a thigh about its own axis.
 _PASSIVE_SHARE = 1.0 / 3.0
 
 
-@dataclass(frozen=True)
-class ServoConfig:
-    """Gains of the tracking servos, all in one place.
-
-    Attributes:
-        frequency: Natural frequency [rad/s]; stiffness is the inertia felt times its square
-            (Zordan et al. 2007, section 6.1: inertia-scaled PD servos).
-        damping_ratio: 1 is critical.
-        stiffness_floors: Least stiffness [N m/rad] by joint without its side. What knees and ankles
-            move is light, but they carry the body. Two ankles must together exceed its weight
-            times the height of its centre of mass (73 kg x 9.81 m/s2 x 0.9 m = 640 N m/rad), or
-            it topples as a pole would; a bent knee that gives lets the other foot stub its toe.
-        torque_limits: Largest torque [N m] by joint without its side: about what a strong man
-            musters, with half as much again, since the servos stand for both sides of a joint.
-    """
-
-    frequency: float = 40.0
-    damping_ratio: float = 1.0
-    stiffness_floors: Mapping[str, float] = field(default_factory=_stiffness_floors)
-    torque_limits: Mapping[str, float] = field(default_factory=_torque_limits)
-
-    def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            UsageError: One is not positive, or a joint has no torque limit.
-        """
-        for name in ("frequency", "damping_ratio"):
-            if not 0.0 < getattr(self, name) < float("inf"):
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
-        missing = sorted(set(_torque_limits()) - set(self.torque_limits))
-        if missing:
-            raise UsageError(f"torque_limits must name every joint; missing: {', '.join(missing)}")
+def servo_settings() -> dict[str, Any]:
+    """The constants above as `result.json`, manifests and classifiers record them."""
+    return {
+        "frequency": FREQUENCY,
+        "damping_ratio": DAMPING_RATIO,
+        "stiffness_floors": dict(STIFFNESS_FLOORS),
+        "torque_limits": dict(TORQUE_LIMITS),
+    }
 
 
 @dataclass(frozen=True)
@@ -96,31 +79,31 @@ class ServoGains:
     def lead_s(self) -> FloatArray:
         """How far ahead (13,) [s] each target must be read: kv / kp.
 
-        The damping acts towards standing still; a target that is this much later cancels the lag
-        it would cause in a steady movement.
+        Damping acts against all movement. In a steady movement a target from this much later
+        cancels the lag that the damping would cause.
         """
         return self.damping / self.stiffness
 
 
-def servo_gains(character: Character, config: ServoConfig) -> ServoGains:
+def servo_gains(character: Character) -> ServoGains:
     """Gains for a character: stiffness from inertia and frequency, damping from the ratio.
 
-    The damping is that of the inertia which the joint itself moves, also where a floor has raised
-    the stiffness.
+    The damping follows from the inertia that the joint moves, also where a floor has raised the
+    stiffness.
     """
     inertia = joint_inertias(character) + character.model.dof_armature[6::3]
     kinds = [name.split("_")[-1] for name in character.joint_names]
-    floors = np.array([config.stiffness_floors.get(kind, 0.0) for kind in kinds])
-    stiffness = np.maximum(inertia * config.frequency**2, floors)
-    damping = 2.0 * config.damping_ratio * np.sqrt(stiffness * inertia)
-    return ServoGains(stiffness, damping, np.array([config.torque_limits[kind] for kind in kinds]))
+    floors = np.array([STIFFNESS_FLOORS.get(kind, 0.0) for kind in kinds])
+    stiffness = np.maximum(inertia * FREQUENCY**2, floors)
+    damping = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
+    return ServoGains(stiffness, damping, np.array([TORQUE_LIMITS[kind] for kind in kinds]))
 
 
 def joint_inertias(character: Character) -> FloatArray:
-    """Inertia felt at each joint in the rest pose.
+    """Inertia that each joint moves, in the rest pose.
 
     Returns:
-        (13,) largest principal moment [kg m2] of all that hangs from the joint, about the joint.
+        (13,) largest principal moment [kg m2], about the joint, of all bodies that hang from it.
     """
     data = mujoco.MjData(character.model)
     mujoco.mj_forward(character.model, data)
@@ -147,16 +130,15 @@ def _hangs_from(character: Character, body: int, ancestor: int) -> bool:
     return body == ancestor
 
 
-def add_servos(spec: mujoco.MjSpec, character: Character, config: ServoConfig, prefix: str) -> None:
+def add_servos(spec: mujoco.MjSpec, character: Character, prefix: str) -> None:
     """Add a servo for each ball joint to a model under construction.
 
     Args:
         spec: The model; its joints are named prefix + joint name.
-        character: The character whose inertias scale the gains.
-        config: Frequency, damping, floors and limits.
+        character: The character; its inertias scale the gains.
         prefix: Put before the names of joints and servos.
     """
-    gains = servo_gains(character, config)
+    gains = servo_gains(character)
     for i, name in enumerate(character.joint_names):
         servo = spec.add_actuator(
             name=prefix + name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=prefix + name

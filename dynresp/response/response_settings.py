@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
+from dynresp.physics.servo import servo_settings
 from dynresp.response.response import CARRY_ON_EXIT_S, CARRY_ON_SLACK_S, ResponseConfig
 from dynresp.specs.shared_tables import Strict
 from dynresp.specs.values import fixed, whole
@@ -73,8 +73,6 @@ def settings_record(config: ResponseConfig) -> dict[str, Any]:
     record = {}
     for key, (part, name) in _FIELDS.items():
         record[key] = getattr(getattr(config, part) if part else config, name)
-    servo = {item.name: getattr(config.physics.servo, item.name)
-             for item in fields(config.physics.servo)}  # fmt: skip
     return {
         **record,
         "fixed": {
@@ -83,6 +81,6 @@ def settings_record(config: ResponseConfig) -> dict[str, Any]:
             "carry_on_slack_s": CARRY_ON_SLACK_S,
             "position_weight": config.window.position_weight,
             "angle_weight_m": config.window.angle_weight,
-            "servo": {k: dict(v) if isinstance(v, Mapping) else v for k, v in servo.items()},
+            "servo": servo_settings(),
         },
     }

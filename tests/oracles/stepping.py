@@ -117,7 +117,7 @@ class SlowSimulation:
         self.config = config
         self.held = held
         self.probe = mujoco.MjData(self.model)
-        self.leads = servo_gains(character, config.servo).lead_s * config.fps
+        self.leads = servo_gains(character).lead_s * config.fps
 
     @property
     def frames_until_miss(self) -> int:

@@ -11,9 +11,10 @@ from dynresp.motion import rotations
 from dynresp.motion.character import JOINTS, ROOT, ROOT_QUAT, Character
 from dynresp.motion.motion import Motion
 from dynresp.motion.rotations import FloatArray
+from dynresp.physics import servo
 from dynresp.physics.impacts import Ball, Push
 from dynresp.physics.scene import PREFIX, ImpactorKind, PhysicsConfig
-from dynresp.physics.servo import ServoConfig, joint_inertias, servo_gains
+from dynresp.physics.servo import joint_inertias, servo_gains
 from dynresp.physics.trace import Setup
 from tests.oracles.stepping import SlowSimulation, Stepped
 from tests.physics.conftest import SceneMaker
@@ -62,7 +63,7 @@ class TestGains:
             assert inertia == pytest.approx(np.linalg.eigvalsh(block)[-1], rel=1e-6)
 
     def test_left_and_right_are_alike(self, character: Character) -> None:
-        gains = servo_gains(character, ServoConfig())
+        gains = servo_gains(character)
         for i, name in enumerate(character.joint_names):
             j = character.joint_names.index(
                 name.replace("left", "x").replace("right", "left").replace("x", "right")
@@ -73,12 +74,16 @@ class TestGains:
     @pytest.mark.parametrize("frequency", [10.0, 40.0, 80.0])
     @pytest.mark.parametrize("ratio", [0.5, 1.0])
     def test_stiffness_is_inertia_times_frequency_squared_or_the_floor(
-        self, character: Character, frequency: float, ratio: float
+        self,
+        character: Character,
+        frequency: float,
+        ratio: float,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        servo = ServoConfig(
-            frequency=frequency, damping_ratio=ratio, stiffness_floors={"elbow": 500.0}
-        )
-        gains = servo_gains(character, servo)
+        monkeypatch.setattr(servo, "FREQUENCY", frequency)
+        monkeypatch.setattr(servo, "DAMPING_RATIO", ratio)
+        monkeypatch.setattr(servo, "STIFFNESS_FLOORS", {"elbow": 500.0})
+        gains = servo_gains(character)
         moved = joint_inertias(character) + character.model.dof_armature[6::3]
         for joint, name in enumerate(character.joint_names):
             floor = 500.0 if name.endswith("elbow") else 0.0
@@ -90,13 +95,13 @@ class TestGains:
     def test_the_model_has_them(self, scene_of: SceneMaker, character: Character) -> None:
         """Servo and joint together damp as much as the gains say."""
         scene = scene_of(ImpactorKind.NONE)
-        gains = servo_gains(character, scene.config.servo)
+        gains = servo_gains(character)
         for i, name in enumerate(character.joint_names):
-            servo, joint = scene.model.actuator(PREFIX + name), scene.model.joint(PREFIX + name)
-            assert servo.gainprm[0] == pytest.approx(gains.stiffness[i])
-            assert servo.biasprm[1] == pytest.approx(-gains.stiffness[i])
-            np.testing.assert_allclose(joint.damping - servo.biasprm[2], gains.damping[i])
-            assert servo.forcerange[1] == pytest.approx(gains.torque_limit[i])
+            motor, joint = scene.model.actuator(PREFIX + name), scene.model.joint(PREFIX + name)
+            assert motor.gainprm[0] == pytest.approx(gains.stiffness[i])
+            assert motor.biasprm[1] == pytest.approx(-gains.stiffness[i])
+            np.testing.assert_allclose(joint.damping - motor.biasprm[2], gains.damping[i])
+            assert motor.forcerange[1] == pytest.approx(gains.torque_limit[i])
 
     def test_controls_are_the_joint_part_of_a_pose(self, scene_of: SceneMaker) -> None:
         model = scene_of(ImpactorKind.NONE).model
@@ -107,8 +112,7 @@ class TestGains:
 
 
 def test_the_documented_table_is_that_of_the_code(character: Character) -> None:
-    servo = PhysicsConfig().servo
-    gains, inertias = servo_gains(character, servo), joint_inertias(character)
+    gains, inertias = servo_gains(character), joint_inertias(character)
     rows = []
     for i, name in enumerate(character.joint_names):
         row = (
@@ -129,7 +133,7 @@ def test_the_servo_pulls_along_the_shortest_way(
     """Torque kp log(q^-1 q_target) in the child's frame, at rest and below its limit."""
     model = scene_of(ImpactorKind.NONE).model
     data = mujoco.MjData(model)
-    gains = servo_gains(character, PhysicsConfig().servo)
+    gains = servo_gains(character)
     limit = (0.9 * gains.torque_limit / gains.stiffness)[:, None]
     direction = rng.normal(size=(13, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -153,7 +157,7 @@ def test_torque_limits_are_kept(
     poses[5:, JOINTS] = rotations.from_rotation_vector(rng.normal(size=(26, 13, 3))).reshape(26, -1)
     base = Motion(poses, config.fps, "jumping")
     seen = _tracked(character, config, base, tmp_path, held=True)
-    limits = servo_gains(character, config.servo).torque_limit
+    limits = servo_gains(character).torque_limit
     torques = np.array(seen.torques)
     assert (torques <= limits * (1.0 + 1e-9)).all()
     assert (torques.max(axis=0) > 0.99 * limits).all()
