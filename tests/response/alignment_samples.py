@@ -1,5 +1,7 @@
 """Small motions, and reactions to align with them."""
 
+import math
+
 import numpy as np
 
 from dynresp.bench.full_search_speed import synthetic_track
@@ -43,3 +45,31 @@ def sliding(offset: float, frames: int = 40) -> tuple[Track, ReactionTrack]:
     """A reaction, and a trace that is the reaction from `offset` frames on."""
     clip = smooth_track(3, frames)
     return interpolated(clip, offset, FRAMES), ReactionTrack("itself", *clip)
+
+
+def _nan_position(track: Track) -> Track:
+    track[0][3, 2, 1] = math.nan
+    return track
+
+
+def _infinite_quaternion(track: Track) -> Track:
+    track[1][3, 2, 1] = math.inf
+    return track
+
+
+def _long_quaternion(track: Track) -> Track:
+    track[1][3, 2] *= 1.1
+    return track
+
+
+def _without_quaternions(track: Track) -> Track:
+    return track[0], track[1][..., :3]
+
+
+BAD_TRACKS = [
+    (_nan_position, "not finite, the first at frame 3, body 2"),
+    (_infinite_quaternion, "not finite, the first at frame 3, body 2"),
+    (_long_quaternion, "frame 3, body 2 has length 1.1"),
+    (_without_quaternions, "expected .frames, bodies, 3."),
+]
+"""What makes a track unusable, and what the message says (a regular expression)."""

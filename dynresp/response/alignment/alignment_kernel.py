@@ -22,18 +22,14 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from dynresp.response.windows.window_kernel import Q0, Q1, Q2, Q3, Q4
 from dynresp.support.compiling import compiled, helper
 
 # Floats in one vector instruction: `LANES` of `dynresp.response.windows.windows`.
 LANES = 8
 
-# The polynomial Q of `window_kernel`: angle = chord Q(chord^2).
-_Q0 = np.float32(2.0000112)
-_Q1 = np.float32(0.08307144)
-_Q2 = np.float32(0.010329804)
-_Q3 = np.float32(0.00022560566)
-_Q4 = np.float32(0.00075941515)
-_R2, _R3, _R4 = np.float32(2.0) * _Q2, np.float32(3.0) * _Q3, np.float32(4.0) * _Q4
+# Coefficients of the derivative of `window_kernel`'s polynomial Q: angle = chord Q(chord^2).
+_R2, _R3, _R4 = np.float32(2.0) * Q2, np.float32(3.0) * Q3, np.float32(4.0) * Q4
 
 _ZERO, _HALF, _ONE, _TWO = (np.float32(v) for v in (0.0, 0.5, 1.0, 2.0))
 # A difference smaller than this [m, or chord] has no direction, and no slope; a pelvis whose (w, k)
@@ -146,10 +142,10 @@ def _measure(a, a_row, a_frame, a_share, b, b_row, b_frame, b_share, bodies, wp,
         cw, ci, cj, ck = qw - sign * rw, qi - sign * ri, qj - sign * rj, qk - sign * rk
         u = cw * cw + ci * ci + cj * cj + ck * ck
         chord = math.sqrt(u)
-        q = _Q0 + u * (_Q1 + u * (_Q2 + u * (_Q3 + u * _Q4)))
+        q = Q0 + u * (Q1 + u * (Q2 + u * (Q3 + u * Q4)))
         total += wp[e] * distance + wt[e] * (chord * q)
         # d(chord Q) / du, times the change of u; the turn itself changes with either facing.
-        rise = (_HALF * q + u * (_Q1 + u * (_R2 + u * (_R3 + u * _R4)))) / max(chord, _TINY)
+        rise = (_HALF * q + u * (Q1 + u * (_R2 + u * (_R3 + u * _R4)))) / max(chord, _TINY)
         rise = sign * wt[e] * rise
         swing = qk * rw - qw * rk + qj * ri - qi * rj
         own = qw * uw + qi * ui + qj * uj + qk * uk

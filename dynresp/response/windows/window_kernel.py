@@ -28,11 +28,11 @@ from dynresp.support.compiling import compiled, helper
 # Q(u) = 4 asin(sqrt(u) / 2) / sqrt(u) on 0 <= u <= 2 (rotations up to 180 degrees), fitted by
 # weighted least squares for the smallest largest relative error, 5.8e-6. Two more terms would give
 # 1.8e-7 and cost an eighth more time.
-_Q0 = np.float32(2.0000112)
-_Q1 = np.float32(0.08307144)
-_Q2 = np.float32(0.010329804)
-_Q3 = np.float32(0.00022560566)
-_Q4 = np.float32(0.00075941515)
+Q0 = np.float32(2.0000112)
+Q1 = np.float32(0.08307144)
+Q2 = np.float32(0.010329804)
+Q3 = np.float32(0.00022560566)
+Q4 = np.float32(0.00075941515)
 
 # A pair excludes others only if they exceed it by more than rounding can explain.
 _SLACK = np.float32(1.0001)
@@ -71,7 +71,7 @@ def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
     near = w * w + i * i + j * j + k * k
     w, i, j, k = aw + bw, ai + bi, aj + bj, ak + bk
     u = min(near, w * w + i * i + j * j + k * k)
-    q = _Q0 + u * (_Q1 + u * (_Q2 + u * (_Q3 + u * _Q4)))
+    q = Q0 + u * (Q1 + u * (Q2 + u * (Q3 + u * Q4)))
     return wp * distance + wt * (math.sqrt(u) * q)
 
 

@@ -16,6 +16,7 @@ from dynresp.support.errors import MotionError, UnknownNameError, UsageError
 from tests.oracles.alignment import Track, interpolated
 from tests.response.alignment_samples import (
     ALL,
+    BAD_TRACKS,
     FRAMES,
     WINDOW,
     align_one,
@@ -170,27 +171,8 @@ def test_an_aligner_can_be_pickled() -> None:
 # -- errors ------------------------------------------------------------------------------------
 
 
-def _nan(track: Track) -> Track:
-    track[0][3, 2, 1] = math.nan
-    return track
-
-
-def _infinite(track: Track) -> Track:
-    track[1][3, 2, 1] = math.inf
-    return track
-
-
-def _long(track: Track) -> Track:
-    track[1][3, 2] *= 1.1
-    return track
-
-
 def _short(track: Track) -> Track:
     return track[0][:4], track[1][:4]
-
-
-def _without_quaternions(track: Track) -> Track:
-    return track[0], track[1][..., :3]
 
 
 def _of_one_frame(track: Track) -> Track:
@@ -200,11 +182,8 @@ def _of_one_frame(track: Track) -> Track:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (_nan, "not finite, the first at frame 3, body 2"),
-        (_infinite, "not finite, the first at frame 3, body 2"),
-        (_long, "frame 3, body 2 has length 1.1"),
+        *BAD_TRACKS,
         (_short, "has 4 frames"),
-        (_without_quaternions, "expected .frames, bodies, 3."),
         (_of_one_frame, "expected .frames, bodies, 3."),
     ],
 )

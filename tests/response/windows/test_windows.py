@@ -1,6 +1,5 @@
 """Windows: facing frames, and tracks and libraries that are refused."""
 
-import math
 from collections.abc import Callable
 
 import pytest
@@ -15,7 +14,7 @@ from dynresp.response.windows.windows import (
 )
 from dynresp.support.errors import MotionError
 from tests.oracles.alignment import Track
-from tests.response.alignment_samples import smooth_track
+from tests.response.alignment_samples import BAD_TRACKS, smooth_track
 
 CONFIG = WindowErrorConfig(fps=30.0, window_s=5 / 30, exit_max_s=6 / 30)
 TRACE_FRAMES = 6 + 5
@@ -32,34 +31,7 @@ def test_shared_arrays_are_read_only() -> None:
             array.ravel()[...] = 0
 
 
-def _nan_position(track: Track) -> Track:
-    track[0][3, 2, 1] = math.nan
-    return track
-
-
-def _infinite_quaternion(track: Track) -> Track:
-    track[1][3, 2, 1] = math.inf
-    return track
-
-
-def _long_quaternion(track: Track) -> Track:
-    track[1][3, 2] *= 1.1
-    return track
-
-
-def _without_quaternions(track: Track) -> Track:
-    return track[0], track[1][..., :3]
-
-
-@pytest.mark.parametrize(
-    ("spoil", "message"),
-    [
-        (_nan_position, "not finite, the first at frame 3, body 2"),
-        (_infinite_quaternion, "not finite, the first at frame 3, body 2"),
-        (_long_quaternion, "frame 3, body 2 has length 1.1"),
-        (_without_quaternions, "expected .frames, bodies, 3."),
-    ],
-)
+@pytest.mark.parametrize(("spoil", "message"), BAD_TRACKS)
 def test_bad_tracks_are_refused(spoil: Callable[[Track], Track], message: str) -> None:
     with pytest.raises(MotionError, match=f"simulated trace: .*{message}"):
         trace_windows(*spoil(smooth_track(1, TRACE_FRAMES)), CONFIG)
