@@ -54,8 +54,13 @@ class Responder:
         self.library = library
         self.config = config or ResponseConfig()
         fps = self.config.physics.fps
-        if self.config.window.fps != fps or any(r.motion.fps != fps for r in library.reactions):
-            raise MotionError(f"simulation, search and library must all run at {fps:g} fps")
+        rates = {self.config.window.fps, *(r.motion.fps for r in library.reactions)}
+        if rates != {fps}:
+            given = ", ".join(f"{rate:g}" for rate in sorted(rates))
+            raise MotionError(
+                f"the simulation has {fps:g} fps, search and reactions have {given}; expected one "
+                "frame rate for all"
+            )
         self.chooser = chooser or FullSearchChooser(character, library, self.config)
         self._stage = HitStage(character, self.config, threads)
 

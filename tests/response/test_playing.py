@@ -80,31 +80,31 @@ def test_memory_and_the_cost_of_a_hit_do_not_grow_with_what_was_played(
     whole = walking(character, 60.0)
     crowd = _crowd(character, library, whole.slice(0, 200))
     (responder,) = crowd.responders
-    taken = []
+    memory = []
     for lap in range(30):
         piece = whole.slice(200 + 40 * lap, 240 + 40 * lap)
         responder.play(piece, responder.planned_until)
         for _ in range(40):
             crowd.advance()
         hit = functools.partial(responder.hit, Ball(0.3, speed=10.0, offset=4.0))
-        taken.append(_memory_of(hit))
+        memory.append(_memory_of(hit))
         _until(crowd, Phase.APPROACH)
         assert responder.last_hit is not None
         assert len(responder.last_hit.base) < 200
         assert len(responder._timeline.pieces) < 10
-    assert max(taken[-10:]) < 1.5 * max(taken[5:15])
+    assert max(memory[-10:]) < 1.5 * max(memory[5:15])
 
 
 def test_a_hit_costs_the_same_however_long_the_base_motion_is(
     character: Character, library: ReactionLibrary
 ) -> None:
-    taken = []
+    memory = []
     for length in (20.0, 1200.0):
         (responder,) = _crowd(character, library, walking(character, length)).responders
         hits = [functools.partial(responder.hit, Ball(1.0 + k)) for k in range(10)]
-        taken.append(max(_memory_of(hit) for hit in hits))
+        memory.append(max(_memory_of(hit) for hit in hits))
     # A copy of the whole motion would be sixty times as much.
-    assert taken[1] < 1.5 * taken[0]
+    assert memory[1] < 1.5 * memory[0]
 
 
 def test_a_motion_given_during_the_approach_plays_after_a_miss(
