@@ -45,8 +45,8 @@ def finish(
     """
     from dynresp.results.result_json import to_json
 
-    with progress() as tell:
-        content = run.save(out, tell, video)
+    with progress() as report:
+        content = run.save(out, report, video)
     report_unwritten(content["files"])
     typer.echo(to_json({**content, **(more or {})}) if as_json else run_text(content, out, lines))
     if not run.arrived:

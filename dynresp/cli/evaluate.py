@@ -40,8 +40,8 @@ def evaluate(
     if out is not None:
         check_folder(out)
     with progress() as plain:
-        tell = with_elapsed(plain)
-        tell("reading", 0, 1)
+        report = with_elapsed(plain)
+        report("reading", 0, 1)
         from dynresp.datasets.dataset_reader import load_dataset
         from dynresp.learning import evaluation
         from dynresp.response.prediction.classifier_file import load_classifier
@@ -49,9 +49,9 @@ def evaluate(
         from dynresp.results.result_json import to_json
 
         files: dict[str, str] = {}
-        content = evaluation.evaluate(load_classifier(model), load_dataset(dataset), tell)
+        content = evaluation.evaluate(load_classifier(model), load_dataset(dataset), report)
         if out is not None:
-            tell("writing", 0, 1)
+            report("writing", 0, 1)
             from dynresp.learning.evaluation_files import write_report
 
             files = write_report(out, content)

@@ -64,8 +64,8 @@ def generate(
             "only one of them"
         )
     checked = read_dataset_spec(spec).changed(count, seed)
-    with progress() as tell:
-        tell("reading", 0, 1)
+    with progress() as report:
+        report("reading", 0, 1)
         from dynresp.datasets import generation
 
         summary = generation.generate(
@@ -76,14 +76,14 @@ def generate(
             workers,
             scheduler,
             shard_size,
-            _with_rate(tell),
+            _with_rate(report),
             _warn,
         )
     content = summary.to_json()
     typer.echo(json.dumps(content, indent=2) if as_json else _text(content))
 
 
-def _with_rate(tell: Progress) -> Progress:
+def _with_rate(report: Progress) -> Progress:
     """Progress with rate and time left while samples are made."""
     on_terminal = sys.stderr.isatty()
     every = _BAR_S if on_terminal else _LINE_S
@@ -103,7 +103,7 @@ def _with_rate(tell: Progress) -> Progress:
             if not text.startswith(stage) or now - written_at >= every:
                 text = _rate_text(stage, done, of, seen, counted=not on_terminal)
                 written_at = now
-        tell(text, done, of)
+        report(text, done, of)
 
     return with_rate
 

@@ -40,10 +40,10 @@ def build(
     check_file(out)
     folders = motion_folders(motions)
     character = default_character()
-    with progress() as tell:
+    with progress() as report:
         path = find_graph_spec(spec or _USUAL)
         try:
-            graph = build_graph(read_graph_spec(path), folders, path.parent, character, tell)
+            graph = build_graph(read_graph_spec(path), folders, path.parent, character, report)
         except MissingMotionDataError:
             if spec is not None:
                 raise
@@ -53,7 +53,7 @@ def build(
                 err=True,
             )
             path = find_graph_spec(_INSTEAD)
-            graph = build_graph(read_graph_spec(path), folders, path.parent, character, tell)
-        tell(f"writing {out}", 0, 1)
+            graph = build_graph(read_graph_spec(path), folders, path.parent, character, report)
+        report(f"writing {out}", 0, 1)
         save_graph(graph, out)
     typer.echo(graph_text(graph, out, as_json))

@@ -72,10 +72,10 @@ def sketch(
     loaded = load_graph(graph)
     boxes = None if world is None else read_world(world)
     check_folder(out)
-    with progress() as tell:
+    with progress() as report:
         run = sketch_run(
             loaded, default_character(), path=corners, goal=goal_m, start=start_m, world=boxes,
-            maze=maze, seed=seed or 0, fps=fps, progress=tell,
+            maze=maze, seed=seed or 0, fps=fps, progress=report,
         )  # fmt: skip
     # This is known of a path only, and not over terrain.
     off = run.about.get("sketch", {}).get("off_sketch_worst_m")

@@ -79,13 +79,13 @@ def watch(
     opened, live = open_source(source)
     character = default_character()
     remarks: list[str] = []
-    with opened, stopping(live) as stop, progress() as tell:
-        model = VideoModel.of(loaded, character, clusters, tell, remarks.append)
+    with opened, stopping(live) as stop, progress() as report:
+        model = VideoModel.of(loaded, character, clusters, report, remarks.append)
         pictures = iter(opened)
         if live:
 
             def passed(time_s: float) -> None:
-                tell("step out of the picture", int(time_s), int(_STEP_OUT_S))
+                report("step out of the picture", int(time_s), int(_STEP_OUT_S))
 
             pictures = evenly(later(pictures, _STEP_OUT_S, passed), opened.fps)
         settings = VideoSettings(
@@ -98,7 +98,7 @@ def watch(
             ended=stop.ended,
         )
         run, pace = video_run(
-            loaded, character, model, pictures, settings, fps, tell, remarks.append
+            loaded, character, model, pictures, settings, fps, report, remarks.append
         )
     for remark in remarks:
         typer.echo(f"dynresp: {remark}", err=True)

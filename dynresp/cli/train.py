@@ -103,8 +103,8 @@ def train(
     if out is not None:
         check_folder(out.parent)
     with progress() as plain:
-        tell = with_elapsed(plain)
-        tell("reading", 0, 1)
+        report = with_elapsed(plain)
+        report("reading", 0, 1)
         from dynresp.datasets.dataset_reader import load_dataset
         from dynresp.learning import training as learning
         from dynresp.learning.holdout import Split
@@ -122,8 +122,8 @@ def train(
         data = load_dataset(dataset)
         file = out or classifier_file(data.facts.library_identity)
         check_folder(file.parent)
-        trained = learning.train(data, config, tell)
-        tell("writing", 0, 1)
+        trained = learning.train(data, config, report)
+        report("writing", 0, 1)
         if compiled_only:
             exact = trained.classifier.exact.single_precision()
             save_classifier(file, replace(trained.classifier, exact=exact), None)
@@ -135,11 +135,11 @@ def train(
         typer.echo(_text(trained.classifier, file))
 
 
-def with_elapsed(tell: Progress, clock: Callable[[], float] = time.monotonic) -> Progress:
+def with_elapsed(report: Progress, clock: Callable[[], float] = time.monotonic) -> Progress:
     """Progress with the time that a stage has taken; without a terminal only every 20 s.
 
     Args:
-        tell: The progress to call.
+        report: The progress to call.
         clock: Gives seconds.
     """
     every = 0.0 if sys.stderr.isatty() else _LINE_S
@@ -150,10 +150,10 @@ def with_elapsed(tell: Progress, clock: Callable[[], float] = time.monotonic) ->
         now = clock()
         if current != stage:
             stage, began, written_at = current, now, now
-            tell(stage, done, of)
+            report(stage, done, of)
         elif now - written_at >= every:
             written_at = now
-            tell(f"{stage}, {now - began:.0f} s", done, of)
+            report(f"{stage}, {now - began:.0f} s", done, of)
 
     return with_time
 

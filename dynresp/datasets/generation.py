@@ -96,7 +96,7 @@ def generate(
     workers: int | None = None,
     scheduler: str | None = None,
     shard_size: int | None = None,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
     loaded: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> Summary:
     """Make a dataset, or the missing part of it.
@@ -111,7 +111,7 @@ def generate(
         workers: Processes on this machine; by default one per core.
         scheduler: Address of a Dask scheduler; its workers do the work instead.
         shard_size: Samples of a shard; by default what the folder has, else `SHARD_SIZE`.
-        tell: Progress: stage, samples done, samples in all.
+        progress: Called with the stage, samples done, and samples in all.
         loaded: Called with the manifest before any sample is made.
 
     Raises:
@@ -120,7 +120,7 @@ def generate(
         MissingExtraError: PyArrow is not installed.
         DynrespError: It could not be done. Finished shards stay; the next run continues.
     """
-    tell = tell or (lambda stage, done, of: None)
+    progress = progress or (lambda stage, done, of: None)
     require("pyarrow")
     if scheduler is not None:
         from dynresp.datasets.dask_workers import connection_security
@@ -128,7 +128,7 @@ def generate(
         # Refused before motions are loaded, which takes a while.
         connection_security(scheduler)
     with _locked(out):
-        tell("loading motions", 0, spec.plan.count)
+        progress("loading motions", 0, spec.plan.count)
         worker = SampleWorker(spec, spec_folder.resolve(), motions)
         manifest = worker.manifest(_shard_size(out, shard_size, worker))
         there = _checked(out, manifest)
@@ -138,7 +138,7 @@ def generate(
         summary = Summary(out, shards=-(-facts.count // facts.shard_size))
         if there is None:
             _refuse_fewer(out, facts)
-        wanted = _wanted(out, facts, summary, tell, known=there is not None)
+        wanted = _wanted(out, facts, summary, progress, known=there is not None)
         for path in leftover_files(out):
             path.unlink(missing_ok=True)
         # Written before the shards, so that each of them belongs to a known dataset.
@@ -147,7 +147,7 @@ def generate(
         named = None if motions is None else expanded(motions, "--motions").resolve()
         job = Job(spec, spec_folder.resolve(), named, manifest)
         del worker
-        _make(job, facts, wanted, out, workers, scheduler, summary, tell)
+        _make(job, facts, wanted, out, workers, scheduler, summary, progress)
     return summary
 
 
@@ -159,7 +159,7 @@ def _make(
     workers: int | None,
     scheduler: str | None,
     summary: Summary,
-    tell: Progress,
+    progress: Progress,
 ) -> None:
     """Make shards, and write each as soon as it is finished."""
     if not wanted:
@@ -169,19 +169,19 @@ def _make(
     stage = "labelling"
 
     def partly(done: int) -> None:
-        tell(stage, kept + summary.samples_made + done, facts.count)
+        progress(stage, kept + summary.samples_made + done, facts.count)
 
     with ExitStack() as stack:
         if scheduler is None:
-            tell("starting workers", kept, facts.count)
+            progress("starting workers", kept, facts.count)
             made = make_locally(job, list(wanted), workers or cores(), partly)
         else:
             from dynresp.datasets.dask_workers import make_on_cluster
 
-            tell("looking for the scheduler", kept, facts.count)
+            progress("looking for the scheduler", kept, facts.count)
 
             def waiting() -> None:
-                tell("waiting for workers", kept, facts.count)
+                progress("waiting for workers", kept, facts.count)
 
             made = make_on_cluster(job, list(wanted), scheduler, waiting)
         stack.enter_context(closing(made))
@@ -198,11 +198,11 @@ def _make(
             else:
                 summary.made += 1
             summary.seconds = time.perf_counter() - begun
-            tell(stage, kept + summary.samples_made, facts.count)
+            progress(stage, kept + summary.samples_made, facts.count)
 
 
 def _wanted(
-    out: Path, facts: Facts, summary: Summary, tell: Progress, known: bool
+    out: Path, facts: Facts, summary: Summary, progress: Progress, known: bool
 ) -> dict[ShardRange, bool]:
     """The shards that must be made, and whether each replaces a bad one.
 
@@ -210,7 +210,7 @@ def _wanted(
         out: Folder of the dataset.
         facts: What its manifest says.
         summary: Counts the good shards.
-        tell: Progress.
+        progress: Called with the stage, samples done, and samples in all.
         known: Whether the folder's manifest says that it holds this dataset; then a shard of
             another dataset is a bad one, too.
     """
@@ -227,7 +227,7 @@ def _wanted(
         if shard.number not in there:
             wanted[shard] = False
             continue
-        tell("checking what is there", shard.first, facts.count)
+        progress("checking what is there", shard.first, facts.count)
         try:
             columns = read_shard(out, facts.layout, shard)
             facts.check(columns, shard.name)

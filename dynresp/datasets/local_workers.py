@@ -205,7 +205,7 @@ def _stop_worker(worker: _Worker) -> None:
 def _work(job: Job, pipe: Connection) -> None:
     """What a worker process does: load the job, then make one shard after another."""
 
-    def tell(*message: Any) -> None:
+    def report(*message: Any) -> None:
         pipe.send(message)
 
     try:
@@ -213,14 +213,14 @@ def _work(job: Job, pipe: Connection) -> None:
             sample_worker = load_worker(job)
             while True:
                 shard: ShardRange = pipe.recv()
-                tell("begun")
-                tell("made", sample_worker.make(shard, lambda done: tell("done", done)))
+                report("begun")
+                report("made", sample_worker.make(shard, lambda done: report("done", done)))
         except DynrespError as error:
-            tell("error", str(error))
+            report("error", str(error))
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise
         except Exception as error:
-            tell("error", f"a worker failed: {type(error).__name__}: {error}")
+            report("error", f"a worker failed: {type(error).__name__}: {error}")
     except (EOFError, OSError):
         # The main program has ended.
         return

@@ -190,12 +190,12 @@ def best_first(tried: Sequence[TriedParameters]) -> list[TriedParameters]:
     return sorted(tried, key=key)
 
 
-def run_in_thread(work: Callable[[], Result], tell: Callable[[], None]) -> Result:
+def run_in_thread(work: Callable[[], Result], report: Callable[[], None]) -> Result:
     """Do long work in a thread, so that progress can be shown and control-C works.
 
     Args:
         work: The work.
-        tell: Called about twice a second meanwhile.
+        report: Called about twice a second meanwhile.
 
     Returns:
         The result of `work`; its exceptions are raised here.
@@ -215,7 +215,7 @@ def run_in_thread(work: Callable[[], Result], tell: Callable[[], None]) -> Resul
     while thread.is_alive():
         thread.join(_TELL_S)
         if time.monotonic() - last >= _TELL_S:
-            tell()
+            report()
             last = time.monotonic()
     if errors:
         raise errors[0]

@@ -61,7 +61,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_the_version_is_told(dynresp: Command) -> None:
+def test_the_version_is_shown(dynresp: Command) -> None:
     from dynresp import __version__
 
     assert dynresp("--version").stdout == f"dynresp {__version__}\n"
@@ -82,7 +82,9 @@ def test_the_version_is_told(dynresp: Command) -> None:
     ],
     ids=" ".join,
 )
-def test_asking_wrongly_is_said_without_a_trace(dynresp: Command, words: tuple[str, ...]) -> None:
+def test_wrong_arguments_get_a_message_without_a_traceback(
+    dynresp: Command, words: tuple[str, ...]
+) -> None:
     result = dynresp(*words)
     assert result.exit_code == 2
     assert result.stdout == ""
@@ -100,9 +102,9 @@ def test_a_closed_pipe_is_no_error_of_ours(world: Path) -> None:
         assert child.stdout is not None
         assert child.stderr is not None
         child.stdout.close()
-        said = child.stderr.read()
+        message = child.stderr.read()
         child.wait(timeout=600)
-    assert "Traceback" not in said
+    assert "Traceback" not in message
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals differ on Windows")
@@ -116,9 +118,9 @@ def test_an_interruption_ends_it_with_130(world: Path) -> None:
         assert child.stderr is not None
         assert child.stderr.readline().startswith("loading motions")
         child.send_signal(signal.SIGINT)
-        said = child.stderr.read()
+        message = child.stderr.read()
         assert child.wait(timeout=600) == 130
-    assert "Traceback" not in said
+    assert "Traceback" not in message
     assert not (world / "out" / "result.json").exists()
 
 

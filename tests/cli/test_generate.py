@@ -75,7 +75,7 @@ def test_built_in_motions_that_stand_in_are_text(
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--workers", "2", "--scheduler", "tcp://a:1"), "give only one of them"),
         (("--count", "0"), "--count"),
@@ -85,13 +85,13 @@ def test_built_in_motions_that_stand_in_are_text(
         (("--motions", "/no/such/folder"), "does not exist"),
     ],
 )
-def test_asking_wrongly_is_said(
-    plan: Path, tmp_path: Path, dynresp: Command, words: tuple[str, ...], said: str
+def test_wrong_arguments_are_refused(
+    plan: Path, tmp_path: Path, dynresp: Command, words: tuple[str, ...], message: str
 ) -> None:
     result = dynresp("generate", plan, "--out", tmp_path / "out", *words)
     assert result.exit_code == 2
     assert result.stdout == ""
-    assert said in result.stderr
+    assert message in result.stderr
     assert "Traceback" not in result.stderr
     assert not (tmp_path / "out").exists()
 
@@ -131,13 +131,13 @@ def test_lines_are_few(monkeypatch: pytest.MonkeyPatch) -> None:
 
     now = 0.0
     monkeypatch.setattr(generate.time, "monotonic", lambda: now)
-    told: list[str] = []
-    tell = _with_rate(lambda stage, done, of: told.append(stage))
-    tell("starting workers", 0, 9000)
+    stages: list[str] = []
+    report = _with_rate(lambda stage, done, of: stages.append(stage))
+    report("starting workers", 0, 9000)
     for second in range(90):
         now = float(second)
-        tell("labelling", 100 * second, 9000)
-    assert list(dict.fromkeys(told)) == [
+        report("labelling", 100 * second, 9000)
+    assert list(dict.fromkeys(stages)) == [
         "starting workers",
         "labelling, 0 of 9000",
         "labelling, 2000 of 9000, 100 samples/s, 1 min 10 s left",

@@ -34,12 +34,10 @@ def test_show_finds_what_a_foreign_file_is(world: Path, dynresp: Command) -> Non
     assert facts["file"]["leg_m"] == pytest.approx(0.83, abs=0.05)
 
 
-def test_show_tells_the_unit_and_axis_of_a_file_as_it_was_told(
-    world: Path, dynresp: Command
-) -> None:
+def test_show_reports_the_unit_and_axis_that_were_given(world: Path, dynresp: Command) -> None:
     made = dynresp("motions", "export", world / "stand.npz", "--out", world / "bvh").stdout.strip()
-    told = ("--unit", 1.1, "--up", "y")
-    facts = json.loads(dynresp("motions", "show", made, *told, "--json").stdout)
+    options = ("--unit", 1.1, "--up", "y")
+    facts = json.loads(dynresp("motions", "show", made, *options, "--json").stdout)
     assert facts["file"]["unit_m"] == 1.1
     assert facts["file"]["up"] == "y"
     assert facts["file"]["leg_m"] == pytest.approx(0.91, abs=0.06)
@@ -71,10 +69,10 @@ def test_export_writes_npz(world: Path, dynresp: Command) -> None:
     assert read_npz(world / "a" / "walk.npz").name == "built-in: walk"
 
 
-def test_import_takes_what_it_is_told(world: Path, dynresp: Command) -> None:
+def test_import_takes_the_given_options(world: Path, dynresp: Command) -> None:
     bvh = dynresp("motions", "export", world / "stand.npz", "--out", world / "a").stdout.strip()
-    told = ("--unit", 1, "--up", "y", "--fps", 60, "--uneven-floor", "--trim-t-pose")
-    result = dynresp("motions", "import", bvh, "--out", world / "b", *told)
+    options = ("--unit", 1, "--up", "y", "--fps", 60, "--uneven-floor", "--trim-t-pose")
+    result = dynresp("motions", "import", bvh, "--out", world / "b", *options)
     assert result.exit_code == 0, result.stderr
     assert read_npz(result.stdout.strip()).fps == 60.0
     result = dynresp("motions", "import", world / "stand.npz", "--unit", 1, "--out", world / "b")

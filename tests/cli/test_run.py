@@ -46,7 +46,7 @@ def test_a_whole_run(world: Path, dynresp: Command) -> None:
     assert (out / "alignment.png").read_bytes().startswith(PNG)
     page = (out / "recording.html").read_text(encoding="utf-8")
     assert "<html" in page
-    # Where the machine cannot render, that is said, and it is a success all the same.
+    # Where the machine cannot render, a message says so, and it still is a success.
     if content["files"]["video.mp4"] == "written":
         assert b"ftyp" in (out / "video.mp4").read_bytes()[:16]
     else:

@@ -27,10 +27,10 @@ def test_train_and_evaluate(hits: Path, tmp_path: Path, dynresp: Command) -> Non
     model, out = tmp_path / "models" / "tiny.skops", tmp_path / "out"
     done = dynresp("train", hits, "--out", model, "--slices", "0,0.1", "--held-out", 0.2, "--json")
     assert done.exit_code == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["file"] == str(model)
-    assert told["classes"] == list(CHOICES)
-    assert told["slices_s"] == [0.0, 0.1]
+    reported = json.loads(done.stdout)
+    assert reported["file"] == str(model)
+    assert reported["classes"] == list(CHOICES)
+    assert reported["slices_s"] == [0.0, 0.1]
     assert "fitting the exact model" in done.stderr
     classifier = load_classifier(model)
     assert classifier.trained_on.held_out == 0.2
@@ -40,7 +40,7 @@ def test_train_and_evaluate(hits: Path, tmp_path: Path, dynresp: Command) -> Non
     judged = json.loads(done.stdout)
     for key in ("accuracy", "top2_accuracy", "regret", "regret_top2", "per_strategy", "latency_us"):
         assert key in judged
-    held_out = told["models"]["exact"]["held_out"]
+    held_out = reported["models"]["exact"]["held_out"]
     assert judged["accuracy"] == pytest.approx(held_out["accuracy"], abs=1e-6)
     assert judged["samples"] == held_out["samples"]
     assert json.loads((out / "evaluation.json").read_text(encoding="utf-8")) == judged
@@ -82,10 +82,10 @@ def test_what_is_asked_wrongly(hits: Path, other: Path, tmp_path: Path, dynresp:
         ("evaluate", hits / "manifest.json", hits): "zip archive",
         ("evaluate", model, hits, "--out", tmp_path / "file"): "is a file",
     }
-    for words, said in wrong.items():
+    for words, message in wrong.items():
         done = dynresp(*words)
         assert done.exit_code == 2, done.stderr
-        assert said in done.stderr
+        assert message in done.stderr
         assert "Traceback" not in done.stderr
     assert not model.exists()
     assert dynresp("train", hits, "--out", model, "--slices", "0").exit_code == 0
@@ -94,10 +94,10 @@ def test_what_is_asked_wrongly(hits: Path, other: Path, tmp_path: Path, dynresp:
     assert "trained for the library 'tiny'" in done.stderr
 
 
-def test_a_stage_that_lasts_is_told_of_now_and_then() -> None:
-    told: list[str] = []
+def test_a_long_stage_is_reported_now_and_then() -> None:
+    reported: list[str] = []
     times = iter([0.0, 5.0, 25.0, 26.0, 50.0, 51.0])
-    tell = with_elapsed(lambda stage, done, of: told.append(stage), lambda: next(times))
+    report = with_elapsed(lambda stage, done, of: reported.append(stage), lambda: next(times))
     for stage in ["fitting"] * 5 + ["judging"]:
-        tell(stage, 0, 1)
-    assert told == ["fitting", "fitting, 25 s", "fitting, 50 s", "judging"]
+        report(stage, 0, 1)
+    assert reported == ["fitting", "fitting, 25 s", "fitting, 50 s", "judging"]

@@ -54,12 +54,12 @@ def scheduler(
     folder: Path, protocol: str = "tcp", **environment: str
 ) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A scheduler on loopback: its address, and its process."""
-    told = folder / "scheduler.json"
+    scheduler_file = folder / "scheduler.json"
     words = [*DASK, "scheduler", "--host", f"{protocol}://127.0.0.1", "--port", "0",
-             "--no-dashboard", "--scheduler-file", str(told)]  # fmt: skip
+             "--no-dashboard", "--scheduler-file", str(scheduler_file)]  # fmt: skip
     with process(words, folder / "scheduler.log", **environment) as started:
-        awaited(told.exists)
-        yield json.loads(told.read_text())["address"], started
+        awaited(scheduler_file.exists)
+        yield json.loads(scheduler_file.read_text())["address"], started
 
 
 @contextmanager
@@ -97,9 +97,9 @@ def test_two_workers_one_of_which_is_killed(
             )
             awaited(lambda: shards(tmp_path / "out") >= 1)
             first.send_signal(signal.SIGKILL)
-            told, said = job.communicate(timeout=600)
-            assert job.returncode == 0, said
-    content = json.loads(told)
+            output, errors = job.communicate(timeout=600)
+            assert job.returncode == 0, errors
+    content = json.loads(output)
     assert (content["samples"], content["shards_made"]) == (120, 15)
     found = files(tmp_path / "out")
     assert len(found) == 16
@@ -118,11 +118,11 @@ def test_a_scheduler_that_dies(tmp_path: Path, words: list[object]) -> None:
         )  # fmt: skip
         awaited(lambda: shards(tmp_path / "out") >= 1)
         started.kill()
-        told, said = job.communicate(timeout=600)
+        output, errors = job.communicate(timeout=600)
     assert job.returncode == 1
-    assert told == ""
-    assert said.splitlines()[-1].startswith("dynresp: the connection to the Dask scheduler at")
-    assert "Traceback" not in said
+    assert output == ""
+    assert errors.splitlines()[-1].startswith("dynresp: the connection to the Dask scheduler at")
+    assert "Traceback" not in errors
     there = files(tmp_path / "out")
     assert 2 <= len(there) < 21
     # On this machine alone, the same command goes on.
@@ -228,5 +228,5 @@ def test_a_missing_certificate_is_named(tmp_path: Path, missing: str) -> None:
     paths = {f"distributed.comm.tls.{name}": str(there) for name in names}
     paths[f"distributed.comm.tls.{missing}"] = str(tmp_path / "gone.pem")
     with dask.config.set(paths):
-        said = refused("tls://127.0.0.1:1")
-    assert f"distributed.comm.tls.{missing}: '{tmp_path / 'gone.pem'}' cannot be read" in said
+        message = refused("tls://127.0.0.1:1")
+    assert f"distributed.comm.tls.{missing}: '{tmp_path / 'gone.pem'}' cannot be read" in message

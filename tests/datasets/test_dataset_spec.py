@@ -56,7 +56,7 @@ def test_a_plan_in_plain_words_is_the_same_plan(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('kind = "ball"', 'kind = "bal"', "impact 1.kind: expected one of ball, punch, push, got"),
         ('kind = "ball"', 'kind = "strike"', "expected one of ball, punch, push, got 'strike'"),
@@ -89,7 +89,7 @@ def test_a_plan_in_plain_words_is_the_same_plan(text: str) -> None:
         ("[library]", "[settings]\nblend_s = 9\n[library]", "settings.blend_s: expected a number"),
     ],
 )
-def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_wrong_values_are_refused(tmp_path: Path, old: str, new: str, expected: str) -> None:
     assert old in PLAN
     file = tmp_path / "file.toml"
     file.write_text(PLAN.replace(old, new), encoding="utf-8")
@@ -97,7 +97,7 @@ def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) ->
         read_dataset_spec(file)
     message = str(caught.value)
     assert message.startswith(str(file))
-    assert said in message
+    assert expected in message
     assert "pydantic" not in message
 
 
@@ -131,7 +131,7 @@ def test_many_mistakes_are_counted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "expected"),
     [
         (b"\xff\xfe", "is not text in UTF-8"),
         (b"= 3", "is not valid TOML"),
@@ -140,10 +140,10 @@ def test_many_mistakes_are_counted() -> None:
         (b"", "plan is missing"),
     ],
 )
-def test_a_file_that_is_no_dataset_spec(tmp_path: Path, content: bytes, said: str) -> None:
+def test_a_file_that_is_no_dataset_spec(tmp_path: Path, content: bytes, expected: str) -> None:
     file = tmp_path / "p.toml"
     file.write_bytes(content)
-    with pytest.raises(SpecError, match=said):
+    with pytest.raises(SpecError, match=expected):
         read_dataset_spec(file)
 
 

@@ -23,11 +23,11 @@ def test_its_plan_is_right() -> None:
 def test_all_columns_are_explained_in_order() -> None:
     (section,) = re.findall(r"^# The files.*?(?=^# )", TEXT, re.M | re.S)
     rows = re.findall(r"^\| (`[^|]*) \| ([a-z0-9\[\]]+) \|", section, re.M)
-    told = [(name, kind) for names, kind in rows for name in re.findall(r"`(\w+)`", names)]
+    documented = [(name, kind) for names, kind in rows for name in re.findall(r"`(\w+)`", names)]
     types = {"<i8": "int64", "<i4": "int32", "<i2": "int16", "|i1": "int8", "|b1": "bool",
              "<f8": "double", "<f4": "float"}  # fmt: skip
     widths = {3: "[3]", 7: "[features]", 5: "[classes]", 0: ""}
-    assert told == [(c.name, types[c.dtype] + widths[c.width]) for c in columns(7, 5)]
+    assert documented == [(c.name, types[c.dtype] + widths[c.width]) for c in columns(7, 5)]
 
 
 @pytest.mark.parametrize("table", ["plan", "base", "impact", "library", "settings"])
@@ -36,7 +36,7 @@ def test_all_tables_of_a_plan_are_explained(table: str) -> None:
     assert re.search(rf"^\| `\[+{table}\]+` \|", TEXT, re.M)
 
 
-def test_all_that_is_told_at_the_end_is_explained() -> None:
+def test_all_numbers_of_the_summary_are_explained() -> None:
     for key in Summary(Path()).to_json():
         assert f"`{key}`" in TEXT, key
 

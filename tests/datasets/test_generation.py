@@ -34,15 +34,15 @@ def run(out: Path, what: DatasetSpec | None = None, **more: Any) -> Summary:
 
 
 def test_a_dataset_is_made(dataset: Path, tmp_path: Path) -> None:
-    told: list[tuple[str, int, int]] = []
-    summary = run(tmp_path / "a/b", shard_size=8, tell=lambda *said: told.append(said))
+    stages: list[tuple[str, int, int]] = []
+    summary = run(tmp_path / "a/b", shard_size=8, progress=lambda *stage: stages.append(stage))
     assert files(tmp_path / "a/b") == files(dataset)
     content = summary.to_json()
     assert content["samples"] == content["samples_made"] == 20
     assert content["hits"] + content["misses"] + content["diverged"] == 20
     assert (content["shards"], content["shards_made"], content["shards_remade"]) == (3, 3, 0)
     assert content["samples_per_s"] > 0
-    assert told[-1] == ("labelling", 20, 20)
+    assert stages[-1] == ("labelling", 20, 20)
 
 
 def test_a_sample_alone_is_the_same_as_among_others(
@@ -216,15 +216,15 @@ def test_folders_made_in_vain_go_again(tmp_path: Path) -> None:
 
 def test_a_wrong_address_is_refused_before_anything(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    told: list[str] = []
+    stages: list[str] = []
     with pytest.raises(UsageError, match="expected an address such as"):
-        run(tmp_path / "out", scheduler="foo", tell=lambda stage, *_: told.append(stage))
-    assert told == []
+        run(tmp_path / "out", scheduler="foo", progress=lambda stage, *_: stages.append(stage))
+    assert stages == []
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
-    ("what", "size", "said"),
+    ("what", "size", "message"),
     [
         (plan(seed=6), None, r"plan\.plan\.seed"),
         (plan(), 9, "shard_size"),
@@ -237,9 +237,9 @@ def test_a_wrong_address_is_refused_before_anything(tmp_path: Path) -> None:
     ids=["seed", "size", "impacts"],
 )
 def test_another_dataset_is_refused(
-    copied: Path, dataset: Path, what: DatasetSpec, size: int | None, said: str
+    copied: Path, dataset: Path, what: DatasetSpec, size: int | None, message: str
 ) -> None:
-    with pytest.raises(UsageError, match=f"holds another dataset, with another {said}"):
+    with pytest.raises(UsageError, match=f"holds another dataset, with another {message}"):
         run(copied, what, shard_size=size)
     assert files(copied) == files(dataset)
     # Nor without its manifest.

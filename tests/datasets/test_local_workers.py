@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals differ on Windo
 
 
 def quick(job: Any, pipe: Connection) -> None:
-    """A worker whose shards are their own number, and which can be told to die."""
+    """A worker whose shards are their own number, and which can be made to die."""
     marks: Path = job
     while True:
         try:
@@ -53,19 +53,19 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "_work", quick)
 
 
-def collected(folder: Path, identity: str, told: list[int] | None = None) -> list[int]:
+def collected(folder: Path, identity: str, reported: list[int] | None = None) -> list[int]:
     wanted = shard_ranges(identity, 20, 4)
-    said = [] if told is None else told
-    found = list(make_locally(folder, wanted, 2, said.append))  # type: ignore[arg-type]
+    counts = [] if reported is None else reported
+    found = list(make_locally(folder, wanted, 2, counts.append))  # type: ignore[arg-type]
     assert all(data == str(place.number).encode() for place, data in found)
     return [place.number for place, _ in found]
 
 
 @pytest.mark.usefixtures("stand_in")
 def test_every_shard_is_made_once(tmp_path: Path) -> None:
-    told: list[int] = []
-    assert sorted(collected(tmp_path, "x", told)) == [0, 1, 2, 3, 4]
-    assert set(told) <= {2, 4}
+    reported: list[int] = []
+    assert sorted(collected(tmp_path, "x", reported)) == [0, 1, 2, 3, 4]
+    assert set(reported) <= {2, 4}
 
 
 @pytest.mark.usefixtures("stand_in")
@@ -92,13 +92,13 @@ def test_workers_that_die_at_once_are_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(processes, "_work", dies_at_once)
-    said = r"10 worker processes died one after another before they began \(exit code 3\)"
-    with pytest.raises(DynrespError, match=said):
+    message = r"10 worker processes died one after another before they began \(exit code 3\)"
+    with pytest.raises(DynrespError, match=message):
         collected(tmp_path, "x")
 
 
 @pytest.mark.usefixtures("stand_in")
-def test_what_a_worker_refuses_is_said(tmp_path: Path) -> None:
+def test_errors_of_a_worker_are_reported(tmp_path: Path) -> None:
     with pytest.raises(DynrespError, match="no such motion"):
         collected(tmp_path, "refuses")
 
@@ -124,11 +124,11 @@ def test_two_workers_make_the_same_bytes(
 ) -> None:
     manifest = sample_worker.manifest(8)
     job = Job(plan(), tmp_path, tmp_path, manifest)
-    told: list[int] = []
-    made = make_locally(job, shard_ranges(manifest["identity"], 20, 8), 2, told.append)
+    reported: list[int] = []
+    made = make_locally(job, shard_ranges(manifest["identity"], 20, 8), 2, reported.append)
     found = {place.name: data for place, data in made}
     assert found == {k: v for k, v in files(dataset).items() if k.startswith("shard")}
-    assert max(told) >= 8
+    assert max(reported) >= 8
 
 
 @pytest.mark.slow

@@ -89,8 +89,8 @@ def test_a_killed_worker_costs_nothing(
     with started(words) as job:
         awaited(lambda: len(workers_of(job)) == 2)
         os.kill(workers_of(job)[0], signal.SIGKILL)
-        _, said = job.communicate(timeout=600)
-        assert job.returncode == 0, said
+        _, errors = job.communicate(timeout=600)
+        assert job.returncode == 0, errors
     assert files(tmp_path / "out") == files(dataset)
 
 
@@ -106,11 +106,11 @@ def test_an_interruption_ends_it_in_order(
             os.killpg(job.pid, signal.SIGINT)
         else:
             job.send_signal(signal.SIGINT)
-        told, said = job.communicate(timeout=600)
+        output, errors = job.communicate(timeout=600)
         assert job.returncode == 130
-    assert told == ""
-    assert said.endswith("dynresp: interrupted\n")
-    assert "Traceback" not in said
+    assert output == ""
+    assert errors.endswith("dynresp: interrupted\n")
+    assert "Traceback" not in errors
     assert all(gone(pid) for pid in team)
     assert ran(*words).returncode == 0
     assert files(tmp_path / "out") == files(dataset)

@@ -62,19 +62,19 @@ def test_places_cover_all_samples_once(count: int, size: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "said"),
+    ("place", "message"),
     [
         (replace(PLACE, number=3), "expected shard 3, it has 2"),
         (replace(PLACE, first=7), "expected first 7, it has 14"),
         (replace(PLACE, rows=8), "expected rows 8, it has 7"),
     ],
 )
-def test_another_shard_gives_itself_away(place: ShardRange, said: str) -> None:
-    with pytest.raises(ShardError, match=f"file: {said}"):
+def test_another_shard_gives_itself_away(place: ShardRange, message: str) -> None:
+    with pytest.raises(ShardError, match=f"file: {message}"):
         decode(DATA, LAYOUT, place, "file")
 
 
-def test_a_shard_of_another_dataset_is_told_from_a_damaged_one() -> None:
+def test_a_shard_of_another_dataset_differs_from_a_damaged_one() -> None:
     with pytest.raises(OtherDatasetError, match="file: a shard of another dataset"):
         decode(DATA, LAYOUT, replace(PLACE, identity="xyz"), "file")
 

@@ -94,7 +94,7 @@ def test_the_examples_are_right(file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('kind = "ball"', 'kind = "bal"', "impact.kind: expected one of ball, punch, push, strike"),
         ('kind = "ball"', 'kind = "bal"', "did you mean 'ball'"),
@@ -139,12 +139,12 @@ def test_the_examples_are_right(file: Path) -> None:
         ("[settings]", '[[impact]]\nkind = "push"\n[settings]', "takes one [[impact]]"),
     ],
 )
-def test_what_is_wrong_is_said(old: str, new: str, said: str) -> None:
+def test_wrong_values_are_refused(old: str, new: str, expected: str) -> None:
     with pytest.raises(SpecError) as caught:
         parse_experiment(changed(old, new), "file.toml")
     message = str(caught.value)
     assert message.startswith("file.toml:")
-    assert said in message
+    assert expected in message
     assert "pydantic" not in message
 
 
@@ -164,7 +164,7 @@ def test_a_strike_needs_its_striker() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "expected"),
     [
         (b"\xff\xfe", "is not text in UTF-8"),
         (b"= 3", "is not valid TOML"),
@@ -173,10 +173,10 @@ def test_a_strike_needs_its_striker() -> None:
         (b"", "experiment is missing"),
     ],
 )
-def test_a_file_that_is_no_experiment(tmp_path: Path, content: bytes, said: str) -> None:
+def test_a_file_that_is_no_experiment(tmp_path: Path, content: bytes, expected: str) -> None:
     file = tmp_path / "e.toml"
     file.write_bytes(content)
-    with pytest.raises(SpecError, match=said):
+    with pytest.raises(SpecError, match=expected):
         read_experiment(file)
 
 

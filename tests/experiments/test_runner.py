@@ -160,7 +160,7 @@ def test_a_strike_shows_the_second_character(world: Path, character: Character) 
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "error", "said"),
+    ("old", "new", "error", "message"),
     [
         ("time_s = 1.0", "time_s = 0.1", SpecError, r"impact\.time_s: the impact is due at 0\.1 s"),
         ("time_s = 1.0", "time_s = 9.0", SpecError, r"it can be from 0\.2 to 4 s"),
@@ -173,11 +173,11 @@ def test_a_strike_shows_the_second_character(world: Path, character: Character) 
         ('"library.toml"', '"gone.toml"', SpecError, "gone.toml"),
     ],
 )
-def test_what_does_not_fit_is_said(
-    world: Path, old: str, new: str, error: type[DynrespError], said: str
+def test_what_does_not_fit_is_refused(
+    world: Path, old: str, new: str, error: type[DynrespError], message: str
 ) -> None:
     edit(world, old, new)
-    with pytest.raises(error, match=said):
+    with pytest.raises(error, match=message):
         run(world)
     assert not (world / "out").exists()
 
@@ -209,13 +209,13 @@ def test_settings_reach_their_place() -> None:
     assert config.carry_on_max_error == 2.0
     assert config.carry_on_s == 1.0
     assert config.physics.substeps == 10
-    told = settings_record(config)
-    assert {key: told[key] for key in given} == given
+    reported = settings_record(config)
+    assert {key: reported[key] for key in given} == given
     with pytest.raises(SpecError, match=r"settings\.exit_max_s"):
         response_config(SettingsTable(exit_min_s=0.6, exit_max_s=0.2))
 
 
-def test_settings_in_force_are_told_whether_given_or_not(world: Path) -> None:
+def test_all_settings_in_force_are_recorded(world: Path) -> None:
     edit(world, "[output]\n", "[settings]\ngraze_speed_m_s = 0.1\n\n[output]\nwrite = []\n")
     content = run(world)
     assert content["settings"]["graze_speed_m_s"] == 0.1
@@ -226,7 +226,7 @@ def test_settings_in_force_are_told_whether_given_or_not(world: Path) -> None:
     assert content["happened"]["speed_change_m_s"] > 0.1
 
 
-def test_a_graze_is_told(world: Path) -> None:
+def test_a_graze_is_reported(world: Path) -> None:
     edit(world, "[output]\n", "[settings]\ngraze_speed_m_s = 9.0\n\n[output]\nwrite = []\n")
     happened = run(world)["happened"]
     assert happened["outcome"] == "carry on"
@@ -275,7 +275,7 @@ def test_a_picture_that_fails_costs_nothing_else(
     assert json.loads(text)["files"] == content["files"]
 
 
-def test_a_picture_that_fails_in_a_batch_is_told_in_the_summary(
+def test_a_picture_that_fails_in_a_batch_is_in_the_summary(
     world: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     break_pictures(monkeypatch)

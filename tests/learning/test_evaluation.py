@@ -98,7 +98,7 @@ def test_another_library_or_character_is_refused(trained: Trained) -> None:
         evaluate(trained.classifier, dataset(40, character_identity="0" * 16), quiet)
 
 
-def test_other_settings_are_told(trained: Trained, hits: Dataset) -> None:
+def test_other_settings_are_reported(trained: Trained, hits: Dataset) -> None:
     assert evaluate(trained.classifier, hits, quiet)["differing_settings"] == []
     changed = {**SETTINGS, "window_s": 0.2, "blend_s": 0.1}
     content = evaluate(trained.classifier, dataset(400, settings=changed), quiet)
@@ -128,8 +128,8 @@ def test_the_folder_of_an_evaluation(trained: Trained, hits: Dataset, tmp_path: 
     content = evaluate(trained.classifier, hits, quiet)
     files = write_report(tmp_path / "out", content)
     assert files == dict.fromkeys([EVALUATION, TABLE, PICTURE], WRITTEN)
-    told = json.loads((tmp_path / "out" / EVALUATION).read_text(encoding="utf-8"))
-    assert told["accuracy"] == pytest.approx(content["accuracy"], abs=1e-6)
+    reported = json.loads((tmp_path / "out" / EVALUATION).read_text(encoding="utf-8"))
+    assert reported["accuracy"] == pytest.approx(content["accuracy"], abs=1e-6)
     with (tmp_path / "out" / TABLE).open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["strategy"] for row in rows] == list(content["per_strategy"])

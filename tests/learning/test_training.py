@@ -63,7 +63,7 @@ def test_the_same_samples_in_another_order_train_the_same(trained: Trained, hits
     np.testing.assert_array_equal(again.exact.weights, trained.classifier.exact.weights)
 
 
-def test_what_it_was_trained_on_is_told(trained: Trained, hits: Dataset) -> None:
+def test_what_it_was_trained_on_is_recorded(trained: Trained, hits: Dataset) -> None:
     on, facts = trained.classifier.trained_on, trained.classifier.facts
     missed = int(np.count_nonzero(hits.label < 0))
     usable = hits.index[hits.label >= 0]
@@ -206,12 +206,12 @@ def test_samples_of_one_class_cannot_be_fitted(rng: np.random.Generator) -> None
         fit_pipeline(rng.normal(size=(9, 3)), np.zeros(9, int), Parameters(2, 1.0, 1.0))
 
 
-def test_long_work_is_told_of_and_its_errors_come_through() -> None:
+def test_long_work_is_reported_and_its_errors_are_raised() -> None:
     import time
 
-    told = []
-    assert run_in_thread(lambda: time.sleep(1.2) or 7, lambda: told.append(1)) == 7
-    assert told
+    reported = []
+    assert run_in_thread(lambda: time.sleep(1.2) or 7, lambda: reported.append(1)) == 7
+    assert reported
 
     def fail() -> None:
         raise UsageError("no")

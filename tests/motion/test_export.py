@@ -95,7 +95,7 @@ class TestBvh:
         self, character: Character, wild: Motion, tmp_path: Path
     ) -> None:
         write_bvh(wild, tmp_path / "wild.bvh", character)
-        read = read_bvh(tmp_path / "wild.bvh")  # unit and up axis found, not told
+        read = read_bvh(tmp_path / "wild.bvh")  # unit and up axis found, not given
         bodies = [read.names.index(name) for name in character.body_names]
         states = character.kinematics(wild.poses)
         np.testing.assert_allclose(read.joint_positions()[:, bodies], states.positions, atol=1e-5)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-import daqp  # noqa: F401  (the solver that mink is told to use)
+import daqp  # noqa: F401  (the solver that mink must use)
 import mink
 import mujoco
 import numpy as np

@@ -45,7 +45,7 @@ def walks(
 
 
 def path_of(walk: tuple[int, ...], clusters: Clusters) -> tuple[int, ...]:
-    """The cluster path of a walk: its clusters, each stay told once."""
+    """The cluster path of a walk: its clusters, each stay once."""
     labels = [int(clusters.labels[frame]) for frame in walk]
     return tuple(c for k, c in enumerate(labels) if k == 0 or c != labels[k - 1])
 

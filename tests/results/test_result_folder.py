@@ -51,7 +51,9 @@ def test_links_and_folders_of_those_names_are_left_alone(tmp_path: Path) -> None
     assert len(there(tmp_path / "elsewhere")) == len(RESPONSE)
 
 
-def test_what_cannot_be_removed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_removed_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def unlink(path: Path, missing_ok: bool = False) -> None:
         raise PermissionError(13, "Permission denied")
 
@@ -65,7 +67,7 @@ def test_what_cannot_be_removed_is_told(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize(
-    ("error", "said", "failure"),
+    ("error", "message", "failure"),
     [
         (None, "written", False),
         (RenderingUnavailableError("no GL"), "not written: no GL", False),
@@ -76,14 +78,14 @@ def test_what_cannot_be_removed_is_told(tmp_path: Path, monkeypatch: pytest.Monk
         (KeyError(), "failed: KeyError", True),
     ],
 )
-def test_whatever_happens_is_told(error: Exception | None, said: str, failure: bool) -> None:
+def test_every_error_is_reported(error: Exception | None, message: str, failure: bool) -> None:
     def write(path: Path) -> None:
         if error is not None:
             raise error
 
-    told = folder.attempt(write, Path("x"))
-    assert told.startswith(said)
-    assert folder.is_failure(told) is failure
+    reported = folder.attempt(write, Path("x"))
+    assert reported.startswith(message)
+    assert folder.is_failure(reported) is failure
 
 
 def test_an_interruption_is_none_of_it() -> None:

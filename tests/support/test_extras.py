@@ -123,9 +123,9 @@ def test_demo_without_optional_packages(tmp_path: Path) -> None:
     assert {path.name for path in out.iterdir()} == {"result.json", "motion.npz", "motion.bvh"}
     left_out = {name for name, what in content["files"].items() if "dynresp[view]" in what}
     assert left_out == {"recording.html", "filmstrip.png", "alignment.png", "video.mp4"}
-    said = [line for line in done.stderr.splitlines() if "pip install 'dynresp[view]'" in line]
-    assert all(any(name in line for line in said) for name in left_out)
-    assert len(said) == 3
+    remarks = [line for line in done.stderr.splitlines() if "pip install 'dynresp[view]'" in line]
+    assert all(any(name in line for line in remarks) for name in left_out)
+    assert len(remarks) == 3
 
 
 def test_python_without_optional_packages(tmp_path: Path) -> None:

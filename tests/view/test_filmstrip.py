@@ -138,8 +138,8 @@ def test_a_figure_lying_down(tmp_path: Path) -> None:
 
 def test_dollar_signs_are_no_mathematics(tmp_path: Path) -> None:
     text = "price $\\foo{$ up"
-    told = story_of(striding(30, 1.3), title=text, subtitle=text, events=[StoryEvent(text, 0.3)])
-    write_filmstrip(told, tmp_path / "a.png", **SMALL)
+    shown = story_of(striding(30, 1.3), title=text, subtitle=text, events=[StoryEvent(text, 0.3)])
+    write_filmstrip(shown, tmp_path / "a.png", **SMALL)
     plain = story_of(striding(30, 1.3), title="", subtitle="", events=[StoryEvent("", 0.3)])
     write_filmstrip(plain, tmp_path / "b.png", **SMALL)
     # The title is written, in dark letters on white: there is more ink than without it.

@@ -22,8 +22,10 @@ def moment(time_s: float, rows: slice, columns: slice) -> VideoMoment:
 
 def watched(moments: list[VideoMoment], actions: int) -> VideoControlStory:
     motion = load_builtin("walk")
-    told = [None, *(k % actions for k in range(19))]
-    line = ActionTimeline([0.1 * (k + 1) for k in range(20)], told, told, [0, *told[1:]])
+    actions_seen = [None, *(k % actions for k in range(19))]
+    line = ActionTimeline(
+        [0.1 * (k + 1) for k in range(20)], actions_seen, actions_seen, [0, *actions_seen[1:]]
+    )
     poses = np.repeat(motion.poses[:1], actions, axis=0)
     return VideoControlStory(motion, moments, line, poses, ["goes on, turns left"] * actions)
 

@@ -39,11 +39,11 @@ def test_a_film_that_plays_everywhere(
     assert [p.name for p in file.parent.iterdir()] == ["video.mp4"]
     assert seen[-1] == (30, 30)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    told = subprocess.run(
+    output = subprocess.run(
         [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(file)], capture_output=True, text=True
     ).stderr
-    assert re.search(r"Video: h264.*yuv420p.*320x240.*30 fps", told), told
-    duration = re.search(r"Duration: 00:00:(\d+\.\d+)", told)
+    assert re.search(r"Video: h264.*yuv420p.*320x240.*30 fps", output), output
+    duration = re.search(r"Duration: 00:00:(\d+\.\d+)", output)
     assert duration is not None
     assert float(duration.group(1)) == pytest.approx(1.0, abs=0.04)
 
