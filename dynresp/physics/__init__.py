@@ -1,1 +1,1 @@
-"""The hit in MuJoCo: the scene, the servos, what hits, and many simulations at once."""
+"""Simulation of hits in MuJoCo: the scene, the servos, impacts, and batches of simulations."""

@@ -1,4 +1,4 @@
-"""Drawing hits from an `[[impact]]` table: random values, and the impact for the simulation."""
+"""Draws hits from an `[[impact]]` table of a spec: random values, and the impact from them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Hit:
     """One hit of an experiment.
 
     Attributes:
-        number: Its place in the experiment, from 0.
-        values: The impact's keys and the values drawn for this hit; units stand in the keys.
-        impact: The same for the simulation.
+        number: Its number in the experiment, from 0.
+        values: The keys of the impact's table with the values of this hit; keys hold the units.
+        impact: The impact with these values.
     """
 
     number: int
@@ -38,15 +38,15 @@ def draw_hits(
 ) -> list[Hit]:
     """Draw hits.
 
-    A hit depends on the seed and its own number alone, not on how many there are.
+    A hit depends only on the seed and its number, not on how many hits there are.
 
     Args:
-        table: The impact, with ranges where values are random.
+        table: The impact's table; random values are ranges.
         seed: Seed of the experiment.
-        numbers: Which hits.
-        strike: The second character's motion, where the impact is a strike.
-        strike_s: When the fist meets the target in it [s].
-        side: The arm that strikes.
+        numbers: Numbers of the hits.
+        strike: The second character's motion, for a strike.
+        strike_s: Time in it at which the fist meets the target [s].
+        side: The arm that strikes, "left" or "right".
     """
     hits = []
     for n in numbers:

@@ -1,6 +1,6 @@
-"""What a spec file may say of an impact. `docs/experiments.md` explains it.
+"""The `[[impact]]` tables of a spec; `docs/experiments.md` explains them.
 
-Units stand in the names of the keys. Times count from the start of the base motion as it is cut.
+Names of keys hold the units. Times count from the start of the base motion after its cut.
 """
 
 from __future__ import annotations
@@ -23,20 +23,10 @@ def _check_body(given: str) -> None:
 
 
 Body: TypeAlias = Annotated[Name, name(_check_body)]
-
-
 Time: TypeAlias = Annotated[Number, number(0.0, 3600.0, "s")]
-
-
 Bearing: TypeAlias = Annotated[Number, number(-360.0, 360.0, "degrees")]
-
-
 Elevation: TypeAlias = Annotated[Number, number(-60.0, 89.0, "degrees")]
-
-
 Height: TypeAlias = Annotated[Number | None, number(0.0, 2.5, "m")]
-
-
 Offset: TypeAlias = Annotated[Number, number(-1.0, 1.0, "m")]
 
 
@@ -54,7 +44,7 @@ class Striker(StrikerCut):
 
 
 class ImpactTable(Strict):
-    """What all kinds of impacts share."""
+    """Keys of all kinds of impacts."""
 
     kind: str
     time_s: Time
@@ -62,7 +52,7 @@ class ImpactTable(Strict):
 
 
 class BallTable(ImpactTable):
-    """A thrown ball."""
+    """A thrown ball, as `impacts.Ball`."""
 
     kind: Literal["ball"]
     mass_kg: Annotated[Number, number(0.05, 200.0, "kg")] = 6.0
@@ -75,7 +65,7 @@ class BallTable(ImpactTable):
 
 
 class PunchTable(ImpactTable):
-    """A fist-sized mass."""
+    """A mass of the size of a fist, as `impacts.Punch`."""
 
     kind: Literal["punch"]
     mass_kg: Annotated[Number, number(0.05, 50.0, "kg")] = 2.9
@@ -88,7 +78,7 @@ class PunchTable(ImpactTable):
 
 
 class PushTable(ImpactTable):
-    """A force that rises and falls."""
+    """A force that rises and falls, as `impacts.Push`."""
 
     kind: Literal["push"]
     force_n: Annotated[Number, number(1.0, 10_000.0, "N")] = 600.0
@@ -98,7 +88,7 @@ class PushTable(ImpactTable):
 
 
 class StrikeTable(ImpactTable):
-    """A second character's recorded strike."""
+    """The recorded strike of a second character, as `impacts.Strike`."""
 
     kind: Literal["strike"]
     target: Body = "head"

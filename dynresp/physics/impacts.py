@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from dynresp.motion.motion import Motion
-from dynresp.support.errors import SpecError
+from dynresp.support.checks import check_number
+from dynresp.support.errors import SpecError, UsageError
 
 
 @dataclass(frozen=True)
@@ -176,29 +177,32 @@ class Strike:
 Impact: TypeAlias = Ball | Punch | Push | Strike
 
 BOUNDS = {
-    "time": (0.0, 1e6),
-    "speed": (2.0, 2000.0),
-    "mass": (0.01, 200.0),
-    "radius": (0.01, 1.0),
-    "from_deg": (-720.0, 720.0),
-    "elevation_deg": (-89.0, 89.0),
-    "height": (0.0, 3.0),
-    "offset": (-10.0, 10.0),
-    "force": (0.0, 50_000.0),
-    "duration": (0.005, 5.0),
-    "motion_time": (0.0, 1e6),
+    "time": (0.0, 1e6, "s"),
+    "speed": (2.0, 2000.0, "m/s"),
+    "mass": (0.01, 200.0, "kg"),
+    "radius": (0.01, 1.0, "m"),
+    "from_deg": (-720.0, 720.0, "degrees"),
+    "elevation_deg": (-89.0, 89.0, "degrees"),
+    "height": (0.0, 3.0, "m"),
+    "offset": (-10.0, 10.0, "m"),
+    "force": (0.0, 50_000.0, "N"),
+    "duration": (0.005, 5.0, "s"),
+    "motion_time": (0.0, 1e6, "s"),
 }
-"""Least and largest value of every number of an impact, in the units of the classes above."""
+"""Least and largest value of every number of an impact, and its unit."""
 
 
 def _check(impact: Impact) -> None:
-    """Refuse numbers that are not finite or out of bounds.
+    """Refuse what is not a finite number within its bounds.
 
     Raises:
-        SpecError: Names the number, what was given and what is allowed.
+        SpecError: The message names the number, what was given and what is allowed.
     """
-    for name, (least, most) in BOUNDS.items():
+    for name, (low, high, unit) in BOUNDS.items():
         value = getattr(impact, name, None)
-        # A NaN fails this comparison, too.
-        if value is not None and not least <= value <= most:
-            raise SpecError(f"{name} must be from {least:g} to {most:g}, got {value!r}")
+        if value is None:
+            continue
+        try:
+            check_number(name, value, low, high, unit)
+        except UsageError as error:
+            raise SpecError(str(error)) from None

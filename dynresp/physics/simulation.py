@@ -1,8 +1,8 @@
-"""Hits simulated in batches: approach, contact, look-ahead, and the rest after a rewind.
+"""`Simulation`: simulates hits in batches: approach, contact, look-ahead, rewind and the rest.
 
-All simulations advance frame by frame on `mujoco.batch.Batch`, whose threads run the steps inside
-a frame; Python only hands over a frame's controls. The state at every frame is kept, so that any
-simulation can be taken back to any frame, bitwise.
+All simulations advance frame by frame on `mujoco.batch.Batch`, whose threads run the steps inside a
+frame; Python only passes the controls of a frame. The state at every frame is kept, so that each
+simulation can go back to any frame, bit for bit.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from dynresp.physics.prepared_impact import WAIT_S, sphere_inertia
 from dynresp.physics.scene import ImpactorKind, Scene
 from dynresp.physics.trace import Contact, Divergence, Setup, Trace
 
-# A contact sensor's numbers: found, force (3), position (3).
+# Numbers of a contact sensor: found, force (3), position (3).
 _SENSOR_SIZE = 7
 
 
 class Simulation:
-    """Many hits of one kind, simulated together; each is bitwise what it would be alone.
+    """Many hits of one kind that are simulated together; each has the bits that it has alone.
 
-    The first simulation of a process replaces MuJoCo's handler of warnings, which is one for the
-    whole process and would write them to a file in the working folder.
+    The first simulation of a process replaces MuJoCo's handler of warnings, which the whole process
+    shares and which would write a file into the working folder.
 
     Attributes:
         scene: The world.
-        setups: The simulations.
+        setups: What each simulation starts from and tracks.
         fps: Frame rate [1/s].
         substeps: Steps in a frame.
-        read_ahead: How many frames of its targets a frame needs, itself included.
+        read_ahead: How many frames of targets one frame needs, itself included.
     """
 
     def __init__(self, scene: Scene, setups: Sequence[Setup], threads: int = 0) -> None:
-        """Put every character and impactor where it starts.
+        """Put every character and impactor at its start.
 
         Args:
-            scene: The world; its kind is that of all impacts.
-            setups: The simulations.
-            threads: Threads to step them on, 0 for all cores.
+            scene: The world; all impacts must be of its kind.
+            setups: What each simulation starts from and tracks.
+            threads: Number of threads, 0 for all cores.
         """
         self.scene = scene
         self.setups = list(setups)
@@ -57,7 +57,7 @@ class Simulation:
         self._batch = Batch(scene.model, len(self.setups), threads)
         self._controls = Controls(scene)
         self.read_ahead = self._controls.read_ahead
-        # One row of integration state for each frame that has been reached, per simulation.
+        # For each simulation the integration state of every frame that it has reached.
         self._states: list[list[FloatArray]] = [[] for _ in self.setups]
         self._contacts: list[Contact | None] = [None] * len(self.setups)
         self._diverged: list[Divergence | None] = [None] * len(self.setups)
@@ -69,7 +69,7 @@ class Simulation:
     # -- setting up ---------------------------------------------------------------------------
 
     def _set_impactors(self, ids: Sequence[int]) -> None:
-        """Mass, size and weight of simulations' balls or fists."""
+        """Set mass, size and weight of balls or fists."""
         if self.scene.kind is not ImpactorKind.PROJECTILE:
             return
         model = self.scene.model
@@ -100,11 +100,11 @@ class Simulation:
             self._states[i] = [self._batch.state[i].copy()]
 
     def replace(self, i: int, setup: Setup) -> None:
-        """Forget a simulation and put another where it was; the others are not disturbed.
+        """Replace a simulation by a new one; the others do not change.
 
         Args:
-            i: Which simulation.
-            setup: The new one, for the same scene.
+            i: Index of the simulation.
+            setup: The setup of the new one, for the same scene.
         """
         self.setups[i] = setup
         self._batch.state[i] = self._fresh
@@ -114,28 +114,27 @@ class Simulation:
         self._set_start([i])
 
     def contact(self, i: int) -> Contact | None:
-        """First contact of a simulation so far, None where there was none."""
+        """The first contact of a simulation; None if there was none so far."""
         return self._contacts[i]
 
     def diverged(self, i: int) -> Divergence | None:
-        """Where a simulation blew up, None where it did not."""
+        """Where a simulation became unstable; None if it did not."""
         return self._diverged[i]
 
     def frame(self, i: int) -> int:
-        """The last frame that a simulation has reached, counted from its start."""
+        """The present frame of a simulation, counted from its start."""
         return len(self._states[i]) - 1
 
     # -- running ------------------------------------------------------------------------------
 
     def look_ahead(self, horizon_s: float) -> list[Trace]:
-        """Run every simulation from its start until a given time after its first contact.
+        """Run every simulation from its start to a given time after its first contact.
 
         Until contact the pelvis is held to the base motion; the servos track the base motion all
-        the time. A simulation whose impactor touches nothing until `WAIT_S` after it was due ends
-        there, without contact.
+        the time. A simulation without contact ends `WAIT_S` after its impact was due.
 
         Args:
-            horizon_s: Time to go on after the first contact [s].
+            horizon_s: Time to simulate after the first contact [s].
 
         Returns:
             A trace for each setup.
@@ -158,17 +157,17 @@ class Simulation:
         return int(np.ceil((self.setups[i].impact.due_s + WAIT_S) * self.fps))
 
     def frames_of(self, seconds: float) -> int:
-        """Frames that last at least so long."""
+        """Number of frames that last at least this long [s]."""
         return int(np.ceil(seconds * self.fps - 1e-9))
 
     def approach(self, ids: Sequence[int]) -> None:
         """Run one frame of simulations whose servos track the base motion.
 
-        Where there has been no contact the pelvis is held, unless the setup says otherwise; where
-        the first contact falls into this frame, it is let go from there.
+        Without contact so far the pelvis is held, unless the setup says otherwise. If the first
+        contact is in this frame, the pelvis is released from that step on.
 
         Args:
-            ids: Which simulations, increasing; none that has diverged.
+            ids: Indices of the simulations, increasing; none may have diverged.
         """
         rows = np.asarray(ids)
         waiting = np.array([self._contacts[i] is None for i in ids])
@@ -191,13 +190,13 @@ class Simulation:
             self._keep(i)
 
     def go_on(self, ids: Sequence[int], frames: int) -> None:
-        """Run simulations on along their base motions, all frames in one go.
+        """Run simulations on along their base motions, all frames in one call.
 
-        Bitwise what as many calls of `approach` do, without their overhead.
+        Gives the same bits as that many calls of `approach`, without their overhead.
 
         Args:
-            ids: Which simulations, increasing; none that has not been hit or has diverged.
-            frames: How many frames; one that diverges in any of them keeps none of them.
+            ids: Indices of the simulations, increasing; all must have been hit, none diverged.
+            frames: How many frames. A simulation that diverges in one of them keeps none of them.
         """
         if frames < 1 or not len(ids):
             return
@@ -213,7 +212,7 @@ class Simulation:
         for row, i in enumerate(ids):
             diverged = self._diverged[i]
             if diverged is not None:
-                # After that its records repeat the last one, and time stands still.
+                # After it diverged its records repeat the last one, and time stands still.
                 ran = int(np.count_nonzero(np.diff(found[row, :, 0]) > 0)) + 1
                 frame = first[row] + min((ran - 1) // self.substeps, frames - 1)
                 self._diverged[i] = Divergence(frame, diverged.warning)
@@ -224,17 +223,17 @@ class Simulation:
     def follow(
         self, ids: Sequence[int], frames: Sequence[int], targets: Sequence[FloatArray], length: int
     ) -> list[Trace]:
-        """Take simulations back to earlier frames and go on from there along new targets.
+        """Take simulations back to earlier frames and run them from there along new targets.
 
         Args:
-            ids: Which simulations.
-            frames: The frame to take each back to, bitwise; its later frames are forgotten.
-            targets: For each, (frames, 59) poses to track, the first for the frame gone back to.
-                After the last, the last holds.
-            length: Frames to run.
+            ids: Indices of the simulations.
+            frames: For each, the frame to go back to, bit for bit; its later frames are dropped.
+            targets: For each, (frames, 59) poses to track, from that frame on. After the last
+                pose, the last holds.
+            length: Number of frames to run.
 
         Returns:
-            For each, the whole trace from the setup's first frame.
+            For each, the whole trace from the setup's first frame on.
         """
         # The batch takes its simulations in increasing order.
         order = np.argsort(np.asarray(ids))
@@ -251,7 +250,7 @@ class Simulation:
         return [self.trace(i) for i in ids]
 
     def rewind(self, i: int, frame: int) -> None:
-        """Take a simulation back to an earlier frame, bitwise; its later frames are forgotten."""
+        """Take a simulation back to an earlier frame, bit for bit; its later frames are dropped."""
         del self._states[i][frame + 1 :]
         self._batch.state[i] = self._states[i][frame]
         self._diverged[i] = None
@@ -259,12 +258,12 @@ class Simulation:
     def track(
         self, ids: Sequence[int], targets: Sequence[FloatArray], target_frames: Sequence[int]
     ) -> None:
-        """Run one frame of simulations that are free and track targets of their own.
+        """Run one frame of simulations whose pelvis is free and whose targets are given.
 
         Args:
-            ids: Which simulations, increasing; none that has diverged.
+            ids: Indices of the simulations, increasing; none may have diverged.
             targets: For each, (frames, 59) poses to track; after the last, the last holds.
-            target_frames: Where each is in its targets.
+            target_frames: For each, its present frame in its targets.
         """
         now = [self.frame(i) for i in ids]
         impacts = [self.setups[i].impact for i in ids]
@@ -281,9 +280,9 @@ class Simulation:
         frames: Sequence[int],
         length: int = 1,
     ) -> dict[str | int, npt.NDArray[np.float64]]:
-        """Run so many frames in one go and look for divergence."""
-        # Of each warning the batch holds the last information and the count, which a simulation
-        # that is reset begins anew.
+        """Run a number of frames in one call and detect divergence."""
+        # For each warning the batch holds the last information and the count. The count starts
+        # again when MuJoCo resets a simulation.
         self._batch.warning[ids] = 0
         result = self._batch.rollout(
             length * self.substeps, controls, self._controls.spec, record=record, ids=ids
@@ -295,7 +294,7 @@ class Simulation:
         return result
 
     def _keep(self, i: int) -> None:
-        """Remember the state after a frame, unless the simulation blew up in it."""
+        """Keep the state after a frame, unless the simulation diverged in it."""
         if self._diverged[i] is None:
             self._states[i].append(self._batch.state[i].copy())
 
@@ -308,7 +307,7 @@ class Simulation:
         sensors: npt.NDArray[np.float64] | None,
         frames: Sequence[int],
     ) -> dict[int, int]:
-        """Rows whose first contact falls into this frame, with the step in which it does.
+        """Rows whose first contact is in this frame, with the step of the contact.
 
         Record k of a rollout belongs to the state before step k.
         """
@@ -359,11 +358,11 @@ class Simulation:
         return state[..., 1 : 1 + self.scene.model.nq]
 
     def pose(self, i: int) -> FloatArray:
-        """(59,) the last pose that a simulation has reached."""
+        """The present pose (59,) of a simulation."""
         return self._qpos(self._states[i][-1])[:POSE_SIZE].copy()
 
     def trace(self, i: int) -> Trace:
-        """All frames of a simulation so far."""
+        """The trace of a simulation so far."""
         states = np.stack(self._states[i])
         model = self.scene.model
         qpos = self._qpos(states)
@@ -379,5 +378,5 @@ class Simulation:
 
 @functools.cache
 def _keep_warnings_out_of_files() -> None:
-    """Warnings are read from the batch's counters; MuJoCo would write them to MUJOCO_LOG.TXT."""
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT; warnings are read from the batch's counters."""
     mujoco.set_mju_user_warning(lambda message: None)

@@ -1,4 +1,4 @@
-"""What goes into a simulation and what comes out of it."""
+"""What goes into a simulation (`Setup`) and what comes out of it (`Trace`)."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from dynresp.physics.prepared_impact import PreparedImpact
 
 @dataclass(frozen=True)
 class Setup:
-    """One simulation to be.
+    """What one simulation starts from and tracks.
 
     Attributes:
-        base: (frames, 59) the base motion from the simulation's first frame on, at its frame
-            rate. After its last frame the last pose holds.
+        base: (frames, 59) the base motion from the simulation's first frame on, at the simulation's
+            frame rate. After its last frame the last pose holds.
         impact: What hits.
-        velocity: (45,) the base motion's velocity at that frame, a row of `qvel`; None takes it
-            from the first two frames of `base`.
-        pose: (59,) where the character is at the start, if that is not where `base` begins.
-        held: Whether its pelvis is held to the base motion until contact. A character that has
-            just been hit is not: the simulation takes over from where it is.
+        velocity: (45,) velocity at the first frame, a row of `qvel`; None takes it from the first
+            two frames of `base`.
+        pose: (59,) pose at the first frame; None takes the first of `base`.
+        held: Whether the pelvis is held to the base motion until contact. False for a character
+            that has just been hit: it starts from where it is.
     """
 
     base: FloatArray
@@ -35,11 +35,11 @@ class Contact:
     """The first contact between impactor and character.
 
     Attributes:
-        time_s: Since the simulation's first frame [s].
+        time_s: Time from the simulation's first frame [s].
         frame: First frame at or after the contact.
         body: Name of the body that was hit.
-        force: Contact force in the step of contact [N]; of a push, its peak.
-        point: (3,) where [m], world; of a push, the body's centre of mass at the frame before.
+        force: Contact force in the step of contact [N]; for a push, its peak.
+        point: (3,) position [m], world; for a push, the body's centre of mass at the frame before.
     """
 
     time_s: float
@@ -51,11 +51,11 @@ class Contact:
 
 @dataclass(frozen=True)
 class Divergence:
-    """A simulation that blew up.
+    """Where a simulation became unstable.
 
     Attributes:
         frame: Frame in which it did.
-        warning: MuJoCo's name for what went wrong.
+        warning: MuJoCo's name of the warning, such as "BADQACC".
     """
 
     frame: int
@@ -64,14 +64,15 @@ class Divergence:
 
 @dataclass(frozen=True)
 class Trace:
-    """What one simulation did, frame by frame.
+    """The result of one simulation, frame by frame.
 
     Attributes:
-        poses: (frames, 59); frame 0 is the setup's first frame.
+        poses: (frames, 59) poses; frame 0 is the setup's first frame.
         velocities: (frames, 45) rows of `qvel`.
-        impactor: (frames, 7) pose of the ball, fist or striking arm; None for a push.
-        contact: The first contact; None where the impact missed.
-        diverged: Set where the simulation blew up; the frames are those before it.
+        impactor: (frames, 7) position [m] and quaternion w x y z of the ball, fist or striking arm;
+            None for a push.
+        contact: The first contact; None if the impact missed.
+        diverged: Where the simulation became unstable; None if it did not. The frames end before.
     """
 
     poses: FloatArray

@@ -1,4 +1,4 @@
-"""Hits made ready and simulated until the choice can be made, those of one kind together."""
+"""Prepares hits for the simulation, those of one kind together."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from dynresp.support.errors import MotionError
 
 @dataclass(frozen=True)
 class HitBatch:
-    """Hits that need the same scene, about to be simulated.
+    """Hits of one kind, ready to be simulated in one scene.
 
     Attributes:
-        rows: Which of the hits asked for they are.
+        rows: Their indices among the hits that were given.
         bases: Their base motions.
-        prepared: Their impacts in terms of the simulation.
-        simulation: Where they are simulated.
+        prepared: Their impacts as the simulation needs them.
+        simulation: Simulates them; not started yet.
     """
 
     rows: list[int]
@@ -35,16 +35,16 @@ class HitBatch:
 
 
 class HitStage:
-    """Makes hits on one character ready; its scenes are compiled once.
+    """Prepares hits on one character; each kind of scene is compiled once.
 
     Attributes:
         character: The character.
-        config: Settings.
-        threads: Threads for the physics, 0 for all cores.
+        config: Settings of the response.
+        threads: Threads for the simulation, 0 for all cores.
     """
 
     def __init__(self, character: Character, config: ResponseConfig, threads: int = 0) -> None:
-        """Nothing is compiled before it is needed."""
+        """Compile nothing yet; scenes are compiled when they are first used."""
         self.character = character
         self.config = config
         self.threads = threads
@@ -57,13 +57,13 @@ class HitStage:
         return self._scenes[kind]
 
     def batches(self, hits: Sequence[tuple[Motion, Impact]]) -> Iterator[HitBatch]:
-        """Make hits ready, kind by kind.
+        """Prepare hits, one batch for each kind of impact.
 
         Args:
-            hits: Base motions (at the simulation's frame rate) and what hits them.
+            hits: Pairs of a base motion (at the simulation's frame rate) and an impact.
 
         Raises:
-            SpecError: An impact lies outside its base motion.
+            SpecError: An impact comes before the start or after the end of its base motion.
             MotionError: A base motion has another frame rate.
         """
         physics = self.config.physics
@@ -88,6 +88,6 @@ class HitStage:
 
 
 def velocity_at(motion: Motion, frame: int) -> FloatArray:
-    """A motion's velocity (45,) at a frame, by the central difference where there is one."""
+    """Velocity (45,) of a motion at a frame: a central difference, one-sided at the ends."""
     first = max(frame - 1, 0)
     return pose_velocities(motion.poses[first : frame + 2], motion.fps)[frame - first]

@@ -201,6 +201,13 @@ def test_refuses_numbers_that_make_no_sense(
         impact_type(**numbers)
 
 
+def test_refuses_what_is_not_a_number() -> None:
+    with pytest.raises(SpecError, match="mass must be a number, got '6 kg'"):
+        Ball(1.0, mass="6 kg")  # type: ignore[arg-type]
+    with pytest.raises(SpecError, match=r"mass must be from 0\.01 to 200 kg, got 500"):
+        Ball(1.0, mass=500.0)
+
+
 class TestPush:
     """A force on a body over time."""
 
