@@ -8,10 +8,9 @@ import pytest
 from dynresp.locomotion.sketch.path_search import SearchConfig
 from dynresp.locomotion.sketch.path_walk import SketchConfig
 from dynresp.locomotion.worlds.maze import MazeConfig
-from dynresp.locomotion.worlds.path_planning import PlanningConfig
 from dynresp.support.errors import UsageError
 
-ALL = (SearchConfig, SketchConfig, PlanningConfig, MazeConfig)
+ALL = (SearchConfig, SketchConfig, MazeConfig)
 
 
 @pytest.mark.parametrize("kind", ALL)
@@ -49,7 +48,7 @@ def test_numbers_that_are_too_large() -> None:
 
 
 def test_settings_within_settings() -> None:
-    with pytest.raises(UsageError, match="search must be a SearchConfig, got PlanningConfig"):
-        SketchConfig(search=PlanningConfig())  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="search must be a SearchConfig, got MazeConfig"):
+        SketchConfig(search=MazeConfig())  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="stop must be a bool, got str"):
         SketchConfig(stop="no")  # type: ignore[arg-type]

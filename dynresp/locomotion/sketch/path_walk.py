@@ -14,7 +14,6 @@ from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.sketch.path_search import Found, SearchConfig, SearchGraph
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
-from dynresp.locomotion.worlds.path_planning import PlanningConfig
 from dynresp.locomotion.worlds.paths import distances_to, resampled
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
@@ -58,7 +57,6 @@ class SketchConfig:
 
     Attributes:
         search: What a good way is.
-        planning: What a good path between obstacles is.
         horizon_m: How far ahead along the path a way is looked for [m].
         commit_s: How much of it is played before the next one is looked for [s].
         budget: Most ways that are looked at each time, at most `MOST_LOOKED`; where none is found,
@@ -72,7 +70,6 @@ class SketchConfig:
     """
 
     search: SearchConfig = field(default_factory=SearchConfig)
-    planning: PlanningConfig = field(default_factory=PlanningConfig)
     horizon_m: float = 2.5
     commit_s: float = 1.0
     budget: int = 4000
@@ -82,7 +79,7 @@ class SketchConfig:
     def __post_init__(self) -> None:
         """Check the numbers."""
         check_numbers(self)
-        for name, kind in (("search", SearchConfig), ("planning", PlanningConfig), ("stop", bool)):
+        for name, kind in (("search", SearchConfig), ("stop", bool)):
             if not isinstance(getattr(self, name), kind):
                 given = type(getattr(self, name)).__name__
                 raise UsageError(f"{name} must be a {kind.__name__}, got {given}")

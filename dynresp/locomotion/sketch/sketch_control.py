@@ -55,7 +55,7 @@ def follow_sketch(
     def path_from(closed: FloatArray) -> FloatArray:
         if world is None:
             return points
-        return fit_path(world, points, config.planning, closed)
+        return fit_path(world, points, blocked=closed)
 
     return follower.walk(path_from)
 
@@ -91,7 +91,7 @@ def reach(
     def path_from(closed: FloatArray) -> FloatArray:
         if world is None:
             return np.stack([root, end])
-        return plan_path(world, root, end, config.planning, closed)
+        return plan_path(world, root, end, blocked=closed)
 
     return follower.walk(path_from)
 

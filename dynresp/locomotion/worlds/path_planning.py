@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -12,9 +10,18 @@ from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.paths import as_point, resampled
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IndexArray
-from dynresp.support.checks import check_numbers
 from dynresp.support.errors import DynrespError, UsageError
 
+# Side of the cells of the grid, and about the distance between the points of a path [m].
+_CELL_M = 0.1
+# Smallest distance from a box [m]: half the width that a body needs. From the second distance on
+# [m] it costs nothing; a metre at the first counts as 1 + _NEAR_COST metres.
+_NARROW_M, _COMFORT_M, _NEAR_COST = 0.2, 0.5, 3.0
+# A metre at a distance d from a sketch counts as 1 + _PULL d^2 metres [1/m^2].
+_PULL = 8.0
+# Largest distance from a sketch of a path around obstacles [m]; if there is no path, the next
+# search goes four times as far.
+_REACH_M = 1.0
 # Steps to half of the eight neighbours of a cell; the other half are the same steps back.
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
 # How often a path is smoothed: over about half a metre if planned, a quarter of a metre if it must
@@ -27,65 +34,25 @@ _MAX_STATES = 4_000_000
 _MAX_DISC_CELLS = 500_000_000
 
 
-@dataclass(frozen=True)
-class PlanningConfig:
-    """What a good path is.
-
-    Attributes:
-        resolution_m: Side of the cells of the grid, and about the distance between the points of
-            the path [m].
-        narrow_m: Smallest distance from a box [m]: half the width that a body needs.
-        comfort_m: From this distance from a box on, distance costs nothing [m].
-        dislike: A metre at `narrow_m` from a box counts as 1 + dislike metres.
-        pull: A metre at a distance d from the sketch counts as 1 + pull d^2 metres [1/m^2].
-        reach_m: Largest distance from a sketch of a path around obstacles [m]; four times as much
-            if there is none.
-
-    Raises:
-        UsageError: A number is out of range.
-    """
-
-    resolution_m: float = 0.1
-    narrow_m: float = 0.2
-    comfort_m: float = 0.5
-    dislike: float = 3.0
-    pull: float = 8.0
-    reach_m: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        check_numbers(self)
-        if not (0 < self.resolution_m <= self.reach_m and 0 < self.narrow_m < self.comfort_m):
-            raise UsageError(
-                "a plan needs 0 < resolution_m <= reach_m and 0 < narrow_m < comfort_m, got "
-                f"{self.resolution_m}, {self.reach_m}, {self.narrow_m}, {self.comfort_m}"
-            )
-        if not (self.dislike >= 0 and self.pull >= 0):
-            raise UsageError(f"dislike and pull must be 0 or more, got {self.dislike}, {self.pull}")
-
-
 class _Grid:
     """The middles of square cells over a world, and what a metre costs there."""
 
-    def __init__(self, world: World, config: PlanningConfig, blocked: FloatArray) -> None:
-        self.config = config
+    def __init__(self, world: World, blocked: FloatArray) -> None:
         self.low = np.array(world.bounds[:2])
-        self.shape = world.grid_shape(config.resolution_m)
+        self.shape = world.grid_shape(_CELL_M)
         if self.cells * len(blocked) > _MAX_DISC_CELLS:
             raise UsageError(
                 f"{len(blocked)} discs in {self.cells} cells are too many: their product may be "
                 f"at most {_MAX_DISC_CELLS}; put obstacles into the world instead"
             )
-        self.boxes = CollisionGrid.of(world, config.comfort_m, config.resolution_m)
+        self.boxes = CollisionGrid.of(world, _COMFORT_M, _CELL_M)
         self.blocked = blocked
         index = np.stack(np.unravel_index(np.arange(self.cells), self.shape), axis=1)
-        self.middles = self.low + config.resolution_m * (index + 0.5)
+        self.middles = self.low + _CELL_M * (index + 0.5)
         self.clearance = self.clearance_at(self.middles)
-        near = np.clip(
-            (config.comfort_m - self.clearance) / (config.comfort_m - config.narrow_m), 0.0, 1.0
-        )
-        self.weights = 1.0 + config.dislike * near
-        self.free = self.clearance >= config.narrow_m
+        near = np.clip((_COMFORT_M - self.clearance) / (_COMFORT_M - _NARROW_M), 0.0, 1.0)
+        self.weights = 1.0 + _NEAR_COST * near
+        self.free = self.clearance >= _NARROW_M
 
     @property
     def cells(self) -> int:
@@ -94,7 +61,7 @@ class _Grid:
     def clearance_at(self, points: FloatArray) -> FloatArray:
         """Distance of points (n, 2) to boxes and to blocked discs (rows x, y, radius).
 
-        At most `comfort_m`.
+        At most `_COMFORT_M`.
         """
         out = self.boxes.distances(points)
         for x, y, radius in self.blocked:
@@ -113,7 +80,7 @@ class _Grid:
         if not away[cell] < 2.0:
             raise DynrespError(
                 f"the {what} ({point[0]:.2f}, {point[1]:.2f}) is not within 2 m of ground that is "
-                f"{self.config.narrow_m:g} m away from all obstacles; choose another"
+                f"{_NARROW_M:g} m away from all obstacles; choose another"
             )
         return cell
 
@@ -128,7 +95,7 @@ class _Grid:
             a, b = a[both], b[both]
             starts.append(a)
             stops.append(b)
-            length = self.config.resolution_m * np.hypot(dx, dy)
+            length = _CELL_M * np.hypot(dx, dy)
             costs.append(0.5 * length * (self.weights[a] + self.weights[b]))
         return np.concatenate(starts), np.concatenate(stops), np.concatenate(costs)
 
@@ -137,7 +104,6 @@ def plan_path(
     world: World,
     start: npt.ArrayLike,
     goal: npt.ArrayLike,
-    config: PlanningConfig | None = None,
     blocked: npt.ArrayLike = (),
 ) -> FloatArray:
     """A short path with clearance, by Dijkstra's algorithm on a grid, then smoothed.
@@ -146,33 +112,30 @@ def plan_path(
         world: The boxes.
         start: (2,) where it begins [m].
         goal: (2,) where it ends [m].
-        config: What a good path is.
         blocked: (n, 3) discs to keep out of: x, y and radius [m].
 
     Returns:
-        (k, 2) points about `resolution_m` apart, from the free point nearest to the start to that
+        (k, 2) points at distances of about 0.1 m, from the free point nearest to the start to that
         nearest to the goal.
 
     Raises:
-        UsageError: The world has too many cells of `resolution_m`.
-        DynrespError: There is no way, or no free ground near the start or the goal.
+        UsageError: The world has too many cells.
+        DynrespError: There is no path, or no free ground near the start or the goal.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    config = config or PlanningConfig()
     ends = np.stack([as_point(start, "a start"), as_point(goal, "a goal")])
-    grid = _Grid(world, config, np.asarray(blocked, dtype=np.float64).reshape(-1, 3))
+    grid = _Grid(world, np.asarray(blocked, dtype=np.float64).reshape(-1, 3))
     first, last = grid.nearest_free(ends[0], "start"), grid.nearest_free(ends[1], "goal")
     a, b, costs = grid.edges()
-    ways = csr_array((costs, (a, b)), shape=(grid.cells, grid.cells))
-    _, before = dijkstra(ways, directed=False, indices=[first], return_predecessors=True)
+    edges = csr_array((costs, (a, b)), shape=(grid.cells, grid.cells))
+    _, before = dijkstra(edges, directed=False, indices=[first], return_predecessors=True)
     if first != last and before[0, last] < 0:
         raise DynrespError(
-            f"there is no way from ({ends[0, 0]:.2f}, {ends[0, 1]:.2f}) to "
+            f"there is no path from ({ends[0, 0]:.2f}, {ends[0, 1]:.2f}) to "
             f"({ends[1, 0]:.2f}, {ends[1, 1]:.2f}) that "
-            f"keeps {config.narrow_m:g} m away from all obstacles; choose another goal, or a "
-            "smaller narrow_m"
+            f"keeps {_NARROW_M:g} m away from all obstacles; choose another goal"
         )
     path = grid.middles[_trace(before[0], last)]
     return _smooth(grid, _with_ends(grid, path, ends), _SMOOTHINGS_PLANNED)
@@ -181,51 +144,46 @@ def plan_path(
 def fit_path(
     world: World,
     sketch: npt.ArrayLike,
-    config: PlanningConfig | None = None,
     blocked: npt.ArrayLike = (),
 ) -> FloatArray:
     """The path with clearance nearest to a sketch, which may touch or cut obstacles.
 
-    The shortest path in the product of the grid and the sketch: a state is a cell and how much of
-    the sketch is done. So the sketch is followed from one end to the other, loops included, and a
-    part of it behind a wall is no short cut.
+    It is the shortest path in the product of the grid and the sketch: a state is a cell and the
+    progress along the sketch. So the path follows the sketch from one end to the other, loops
+    included, and takes no short cut to a part of it behind a wall.
 
     Args:
         world: The boxes.
         sketch: (k, 2) points from start to goal [m].
-        config: What a good path is.
         blocked: (n, 3) discs to keep out of: x, y and radius [m].
 
     Returns:
-        (k, 2) as of `plan_path`. If obstacles are too large to go around within four times
-        `reach_m`, the path is planned from the sketch's start to its end.
+        (k, 2) as of `plan_path`. If obstacles are too large to go around within 4 m of the sketch,
+        the path is planned from the sketch's start to its end.
 
     Raises:
-        UsageError: The world has too many cells of `resolution_m`, or the sketch is so long that
-            too many cells are within `reach_m` of it, or, if obstacles cut it off, within four
-            times that.
-        DynrespError: There is no way, or no free ground near the start or the goal.
+        UsageError: The world has too many cells, or the sketch is so long that too many cells are
+            within 1 m of it, or, if obstacles cut it off, within 4 m.
+        DynrespError: There is no path, or no free ground near the start or the goal.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
 
-    config = config or PlanningConfig()
     discs = np.asarray(blocked, dtype=np.float64).reshape(-1, 3)
-    grid = _Grid(world, config, discs)
-    points = resampled(sketch, 2.0 * config.resolution_m)
+    grid = _Grid(world, discs)
+    points = resampled(sketch, 2.0 * _CELL_M)
     first, last = grid.nearest_free(points[0], "start"), grid.nearest_free(points[-1], "goal")
     a, b, costs = grid.edges()
     free = np.flatnonzero(grid.free)
     tree = cKDTree(grid.middles[free])
-    for reach in (config.reach_m, 4.0 * config.reach_m):
+    for reach in (_REACH_M, 4.0 * _REACH_M):
         states = int(np.sum(tree.query_ball_point(points, reach, return_length=True)))
         if states > _MAX_STATES:
             length = np.hypot(*np.diff(points, axis=0).T).sum()
             raise UsageError(
                 f"a sketch {length:.1f} m long is too long to search {reach:g} m around it "
-                f"in cells of {config.resolution_m:g} m; cut it, draw it around the obstacles, or "
-                "choose a smaller reach_m or a larger resolution_m"
+                f"in cells of {_CELL_M:g} m; cut it, or draw it around the obstacles"
             )
         inside = [free[tree.query_ball_point(point, reach)] for point in points]
         keys, away = _near(grid, points, inside, first, last)
@@ -236,18 +194,18 @@ def fit_path(
         order = np.argsort(cell, kind="stable")
         offsets = np.concatenate([[0], np.cumsum(count)])
         repeats = count[a]
-        way = np.repeat(np.arange(len(a)), repeats)
-        within = np.arange(len(way)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-        source = order[offsets[a[way]] + within]
-        target_key = layer[source] * grid.cells + b[way]
+        edge = np.repeat(np.arange(len(a)), repeats)
+        within = np.arange(len(edge)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+        source = order[offsets[a[edge]] + within]
+        target_key = layer[source] * grid.cells + b[edge]
         target = np.searchsorted(keys, target_key)
         found = (target < len(keys)) & (keys[np.minimum(target, len(keys) - 1)] == target_key)
-        way, source, target = way[found], source[found], target[found]
-        pulled = 1.0 + 0.5 * config.pull * (away[source] ** 2 + away[target] ** 2)
+        edge, source, target = edge[found], source[found], target[found]
+        pulled = 1.0 + 0.5 * _PULL * (away[source] ** 2 + away[target] ** 2)
         for one, other in ((source, target), (target, source)):
             rows.append(one)
             columns.append(other)
-            weights.append(costs[way] * pulled)
+            weights.append(costs[edge] * pulled)
         # To the next point of the sketch, in the same cell.
         next_key = keys + grid.cells
         target = np.searchsorted(keys, next_key)
@@ -255,18 +213,18 @@ def fit_path(
         source, target = np.flatnonzero(found), target[found]
         rows.append(source)
         columns.append(target)
-        weights.append(2.0 * config.resolution_m * (1e-3 + config.pull * away[target] ** 2))
+        weights.append(2.0 * _CELL_M * (1e-3 + _PULL * away[target] ** 2))
         size = (len(keys), len(keys))
-        ways = csr_array(
+        edges = csr_array(
             (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=size
         )
         begin = int(np.searchsorted(keys, first))
         end = int(np.searchsorted(keys, (len(points) - 1) * grid.cells + last))
-        _, before = dijkstra(ways, indices=[begin], return_predecessors=True)
+        _, before = dijkstra(edges, indices=[begin], return_predecessors=True)
         if before[0, end] >= 0:
             path = grid.middles[cell[_trace(before[0], end)]]
             return _smooth(grid, _with_ends(grid, path, points[[0, -1]]), _SMOOTHINGS_FITTED)
-    return plan_path(world, points[0], points[-1], config, discs)
+    return plan_path(world, points[0], points[-1], discs)
 
 
 def _near(
@@ -300,7 +258,7 @@ def _trace(before: npt.NDArray[np.int32], last: int) -> list[int]:
 def _with_ends(grid: _Grid, path: FloatArray, ends: FloatArray) -> FloatArray:
     """The path with its ends moved to the wanted ends (2, 2), if they are on free ground."""
     path = path.copy() if len(path) > 1 else np.repeat(path, 2, axis=0)
-    free = grid.clearance_at(ends) >= grid.config.narrow_m
+    free = grid.clearance_at(ends) >= _NARROW_M
     for where, end, is_free in zip((0, -1), ends, free, strict=True):
         if is_free:
             path[where] = end
@@ -309,13 +267,13 @@ def _with_ends(grid: _Grid, path: FloatArray, ends: FloatArray) -> FloatArray:
 
 def _smooth(grid: _Grid, path: FloatArray, times: int) -> FloatArray:
     """Move points to the middle between their neighbours where that keeps the clearance."""
-    path = resampled(path, grid.config.resolution_m)
+    path = resampled(path, _CELL_M)
     clearance = grid.clearance_at(path)
     for _ in range(times):
         moved = path.copy()
         moved[1:-1] = 0.25 * path[:-2] + 0.5 * path[1:-1] + 0.25 * path[2:]
         there = grid.clearance_at(moved)
-        keeps = there >= np.minimum(clearance, grid.config.comfort_m) - 1e-9
+        keeps = there >= np.minimum(clearance, _COMFORT_M) - 1e-9
         path = np.where(keeps[:, None], moved, path)
         clearance = np.where(keeps, there, clearance)
-    return resampled(path, grid.config.resolution_m)
+    return resampled(path, _CELL_M)

@@ -117,7 +117,7 @@ def test_where_no_way_is_the_walk_ends(straight: SearchGraph) -> None:
     assert clearance(straight, walk, world) > 0.0
     assert 0.1 < walk.roots[-1, 0] < 3.0
     closed = World((-2.0, -3.0, 9.0, 3.0), (Obstacle((3.0, 0.0), (0.3, 3.0)),))
-    with pytest.raises(DynrespError, match="no way"):
+    with pytest.raises(DynrespError, match="no path"):
         reach(straight, start, (6.0, 0.0), closed)
 
 

@@ -6,7 +6,7 @@ import pytest
 from dynresp.locomotion.worlds import path_planning as planning
 from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
-from dynresp.locomotion.worlds.path_planning import PlanningConfig, fit_path, plan_path
+from dynresp.locomotion.worlds.path_planning import fit_path, plan_path
 from dynresp.locomotion.worlds.paths import resampled
 from dynresp.support.errors import DynrespError, UsageError
 
@@ -32,20 +32,23 @@ def test_it_goes_around_with_room_to_spare() -> None:
     assert length(path) < 9.5
 
 
-def test_a_narrow_gap_is_taken_only_where_it_saves_a_lot() -> None:
+def test_a_narrow_gap_is_used_only_where_it_saves_much(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = (Obstacle((4.0, -1.85), (0.1, 1.55)), Obstacle((4.0, 1.3), (0.1, 1.0)))
     world = World((-1.0, -3.4, 9.0, 3.4), boxes)
     # The gap between y = -0.3 and y = 0.3, or around by y = 2.8.
-    short, patient = (
-        plan_path(world, (0.0, 0.0), (8.0, 0.0), PlanningConfig(dislike=d)) for d in (1.0, 100.0)
-    )
+    paths = []
+    for cost in (1.0, 100.0):
+        with monkeypatch.context() as patch:
+            patch.setattr(planning, "_NEAR_COST", cost)
+            paths.append(plan_path(world, (0.0, 0.0), (8.0, 0.0)))
+    short, patient = paths
     assert np.abs(short[:, 1]).max() < 0.5
     assert patient[:, 1].max() > 2.3
     closed = plan_path(world, (0.0, 0.0), (8.0, 0.0), blocked=[(4.0, 0.0, 0.3)])
     assert closed[:, 1].max() > 2.3
 
 
-def test_a_sketch_that_needs_no_help_is_kept() -> None:
+def test_a_sketch_on_free_ground_is_kept() -> None:
     angle = np.linspace(0.0, 3.0 * math.pi, 90)
     # One and a half turns: it crosses its own beginning.
     sketch = np.stack([4.0 + 1.5 * np.cos(angle), 1.5 * np.sin(angle)], axis=1)
@@ -59,13 +62,13 @@ def test_a_sketch_that_needs_no_help_is_kept() -> None:
 def test_a_sketch_that_cuts_a_wall_goes_around_its_end() -> None:
     path = fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])
     assert WALL.distances(path).min() > 0.2
-    # Beyond where a way around is first looked for.
+    # The path around lies beyond the first reach.
     path = fit_path(WALL, [(0.0, -1.5), (8.0, -1.5)])
     assert WALL.distances(path).min() > 0.2
     assert path[:, 1].max() > 1.2
 
 
-def test_walls_between_a_sketch_and_its_way_do_not_lead_it_astray() -> None:
+def test_walls_across_a_sketch_do_not_mislead_its_path() -> None:
     for seed in range(10):
         rng = np.random.default_rng(seed)
         maze = random_maze(rng, MazeConfig(loops=0.0, cell_m=1.4))
@@ -76,35 +79,36 @@ def test_walls_between_a_sketch_and_its_way_do_not_lead_it_astray() -> None:
         assert np.hypot(*(path[-1] - maze.solution[-1])) < 1.0
 
 
-def test_there_may_be_no_way() -> None:
+def test_there_may_be_no_path() -> None:
     boxes = (Obstacle((4.0, 0.0), (0.1, 3.0)),)
     world = World((-1.0, -3.0, 9.0, 3.0), boxes)
-    with pytest.raises(DynrespError, match=r"no way from \(0.00, 0.00\) to \(8.00, 0.00\)"):
+    with pytest.raises(DynrespError, match=r"no path from \(0.00, 0.00\) to \(8.00, 0.00\)"):
         plan_path(world, (0.0, 0.0), (8.0, 0.0))
-    with pytest.raises(DynrespError, match="no way"):
+    with pytest.raises(DynrespError, match="no path"):
         fit_path(world, [(0.0, 0.0), (8.0, 0.0)])
     with pytest.raises(DynrespError, match=r"the goal .* is not within 2 m"):
         plan_path(world, (0.0, 0.0), (18.0, 0.0))
 
 
-def test_grids_that_would_be_too_large_are_refused() -> None:
+def test_grids_that_would_be_too_large_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World((-100.0, -100.0, 100.0, 100.0))
-    fine = PlanningConfig(resolution_m=0.01)
+    monkeypatch.setattr(planning, "_CELL_M", 0.01)
     with pytest.raises(UsageError, match=r"200 x 200 m in cells of 0.01 m"):
-        plan_path(world, (0.0, 0.0), (8.0, 0.0), fine)
+        plan_path(world, (0.0, 0.0), (8.0, 0.0))
+    monkeypatch.setattr(planning, "_CELL_M", 0.04)
     discs = np.zeros((20_000, 3))
     with pytest.raises(UsageError, match="20000 discs in 37500 cells"):
-        plan_path(WALL, (0.0, 0.0), (8.0, 0.0), PlanningConfig(resolution_m=0.04), discs)
+        plan_path(WALL, (0.0, 0.0), (8.0, 0.0), discs)
 
 
-def test_what_is_looked_at_around_a_sketch_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Enough for a first look; the second is four times as wide.
+def test_the_search_around_a_sketch_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Enough for the first search; the second is four times as wide.
     monkeypatch.setattr(planning, "_MAX_STATES", 20_000)
     assert WALL.distances(fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])).min() > 0.2
     with pytest.raises(UsageError, match=r"8\.0 m long is too long to search 4 m around"):
         fit_path(WALL, [(0.0, -1.5), (8.0, -1.5)])
     monkeypatch.setattr(planning, "_MAX_STATES", 2_000)
-    with pytest.raises(UsageError, match=r"too long to search 1 m around .* reach_m"):
+    with pytest.raises(UsageError, match=r"too long to search 1 m around .* cut it"):
         fit_path(WALL, [(0.0, 0.5), (8.0, 0.5)])
 
 
@@ -118,10 +122,3 @@ def test_points_along_a_path() -> None:
         resampled([], 0.1)
     with pytest.raises(UsageError, match="finite"):
         resampled([(0.0, math.inf)], 0.1)
-
-
-def test_what_makes_no_sense() -> None:
-    with pytest.raises(UsageError, match="narrow_m < comfort_m"):
-        PlanningConfig(narrow_m=0.5, comfort_m=0.4)
-    with pytest.raises(UsageError, match="pull"):
-        PlanningConfig(pull=-1.0)
