@@ -1,4 +1,7 @@
+from __future__ import annotations
+
 import dataclasses
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -7,10 +10,22 @@ import pytest
 
 from dynresp.locomotion.sketch.path_search import SearchConfig
 from dynresp.locomotion.sketch.path_walk import SketchConfig
-from dynresp.locomotion.worlds.maze import MazeConfig
+from dynresp.support.checks import check_numbers, check_vector
 from dynresp.support.errors import UsageError
 
-ALL = (SearchConfig, SketchConfig, MazeConfig)
+
+@dataclass(frozen=True)
+class Settings:
+    """Two numbers, checked."""
+
+    columns: int = 5
+    cell_m: float = 1.8
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+
+
+ALL = (SearchConfig, SketchConfig, Settings)
 
 
 @pytest.mark.parametrize("kind", ALL)
@@ -24,9 +39,9 @@ def test_what_is_no_number(kind: Any, wrong: object) -> None:
 
 def test_what_is_a_number() -> None:
     assert SketchConfig(budget=np.int64(5), horizon_m=np.float32(2.0)).budget == 5
-    assert MazeConfig(columns=3, cell_m=2).cell_m == 2
+    assert Settings(columns=3, cell_m=2).cell_m == 2
     with pytest.raises(UsageError, match=r"columns must be a whole number, got 2\.5"):
-        MazeConfig(columns=2.5)  # type: ignore[arg-type]
+        Settings(columns=2.5)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", ALL)
@@ -48,7 +63,17 @@ def test_numbers_that_are_too_large() -> None:
 
 
 def test_settings_within_settings() -> None:
-    with pytest.raises(UsageError, match="search must be a SearchConfig, got MazeConfig"):
-        SketchConfig(search=MazeConfig())  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="search must be a SearchConfig, got Settings"):
+        SketchConfig(search=Settings())  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="stop must be a bool, got str"):
         SketchConfig(stop="no")  # type: ignore[arg-type]
+
+
+def test_rows_of_numbers() -> None:
+    for right in ((1, 2.5), [0.0, -1e300], np.array([1.0, 2.0])):
+        check_vector("corner", right, 2)
+    for wrong in ("12", None, 3.0, (1.0,), (1.0, np.nan), (1.0, True), (1, 10**400), np.array(1.0)):
+        with pytest.raises(UsageError, match="corner must be 2 finite numbers, got "):
+            check_vector("corner", wrong, 2)
+    with pytest.raises(UsageError, match=r"size must be 2 finite numbers above 0, got \(1, 0\)"):
+        check_vector("size", (1, 0), 2, above=0.0)

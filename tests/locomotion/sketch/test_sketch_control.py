@@ -15,7 +15,7 @@ from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.path_walk import SketchConfig, SketchedWalk
 from dynresp.locomotion.sketch.sketch_chooser import SketchChooser
 from dynresp.locomotion.sketch.sketch_control import follow_sketch, reach
-from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
+from dynresp.locomotion.worlds.maze import random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
 from dynresp.locomotion.worlds.paths import distances_to, resampled
 from dynresp.motion.builtin import FLAT, load_builtin
@@ -312,7 +312,7 @@ def test_a_passage_too_narrow_to_be_walked_through_is_taken_sideways(walker: Sea
 @pytest.mark.mocap
 def test_mazes_with_narrow_passages(walker: SearchGraph) -> None:
     for seed in range(10):
-        maze = random_maze(np.random.default_rng(seed), MazeConfig(narrow=0.3))
+        maze = random_maze(np.random.default_rng(seed), narrow=0.3)
         way = maze.solution[1] - maze.solution[0]
         start = standing(walker, *maze.solution[0], float(np.arctan2(way[1], way[0])))
         walk = reach(walker, start, maze.solution[-1], maze.world)

@@ -3,8 +3,9 @@ import math
 import numpy as np
 import pytest
 
+from dynresp.locomotion.worlds import maze as mazes
 from dynresp.locomotion.worlds import path_planning as planning
-from dynresp.locomotion.worlds.maze import MazeConfig, random_maze
+from dynresp.locomotion.worlds.maze import random_maze
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
 from dynresp.locomotion.worlds.path_planning import fit_path, plan_path
 from dynresp.locomotion.worlds.paths import resampled
@@ -68,10 +69,11 @@ def test_a_sketch_that_cuts_a_wall_goes_around_its_end() -> None:
     assert path[:, 1].max() > 1.2
 
 
-def test_walls_across_a_sketch_do_not_mislead_its_path() -> None:
+def test_walls_across_a_sketch_do_not_mislead_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mazes, "_CELL_M", 1.4)
     for seed in range(10):
         rng = np.random.default_rng(seed)
-        maze = random_maze(rng, MazeConfig(loops=0.0, cell_m=1.4))
+        maze = random_maze(rng, loops=0.0)
         corners = maze.solution + rng.normal(0.0, 0.3, maze.solution.shape)
         path = fit_path(maze.world, corners)
         assert maze.world.distances(path).min() > 0.19
