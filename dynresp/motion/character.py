@@ -57,36 +57,49 @@ class BodyStates:
 
 
 class Character:
-    """The ragdoll of `models/ragdoll.xml` as kinematics sees it.
+    """A character of 14 bodies and 13 ball joints: its names, masses and kinematics.
+
+    A pose is 59 numbers, a row of MuJoCo's `qpos`: root position [m] (Z up), root quaternion, then
+    one quaternion for each joint relative to its parent, all w x y z. Arrays are read-only.
 
     Attributes:
-        file: The MJCF file it was loaded from.
+        file: The MJCF file from which it was loaded.
         model: Its MuJoCo model, without floor or servos.
-        body_names: 14 names, the pelvis first, parents before children.
-        joint_names: 13 ball joints in the order of `qpos`; joint i moves body i + 1.
+        body_names: The 14 bodies, the pelvis first, parents before children.
+        joint_names: The 13 ball joints in the order of a pose; joint i moves body i + 1.
         parents: (14,) index of each body's parent, -1 for the pelvis.
         offsets: (14, 3) origin of each body in its parent's frame [m].
-        masses: (14,) [kg].
-        mirror_bodies: (14,) the body on the other side, itself for those in the middle.
-        rest_pose: (59,) standing, arms hanging, facing +X.
-        identity: Short hash of the model, which changes when the character does.
+        masses: (14,) mass of each body [kg].
+        mirror_bodies: (14,) index of the body on the other side; a body in the middle has its own.
+        rest_pose: (59,) the pose standing, arms hanging, facing +X.
+        identity: Short hash of the model; it changes when the character does.
+
+    Examples:
+        >>> import dynresp
+        >>> character = dynresp.Character()
+        >>> character.body_names[:4]
+        ('pelvis', 'abdomen', 'chest', 'head')
+        >>> states = character.kinematics(character.rest_pose)
+        >>> states.positions.shape  # frames, bodies, x y z [m]
+        (1, 14, 3)
     """
 
     def __init__(self, model_file: Path | None = None) -> None:
         """Load the character.
 
         Args:
-            model_file: An MJCF file with a free root and 13 ball joints; the product's by default.
+            model_file: An MJCF file with a free root and 13 ball joints; by default dynresp's own,
+                `models/ragdoll.xml`.
 
         Raises:
-            MotionError: The model cannot be read, does not have the degrees of freedom of the
-                character, or has body frames that are turned or away from their joints.
+            MotionError: The file cannot be read, its model has other joints, or its body frames
+                are turned or not at their joints.
         """
         self.file = file = model_file or paths.models_folder() / "ragdoll.xml"
         try:
             self.model = mujoco.MjModel.from_xml_path(str(file))
         except ValueError as error:
-            raise MotionError(f"{file}: no MuJoCo model ({error}); give an MJCF file") from error
+            raise MotionError(f"{file}: not a MuJoCo model ({error}); give an MJCF file") from error
         _check_layout(file, self.model)
         bodies = range(1, self.model.nbody)
         self.body_names = tuple(self.model.body(i).name for i in bodies)
@@ -102,7 +115,7 @@ class Character:
         self.identity = hashlib.sha256(_contents(self.model)).hexdigest()[:16]
 
     def body(self, name: str) -> int:
-        """Index of a body by name (0 is the pelvis).
+        """Index of a body by its name (0 is the pelvis).
 
         Raises:
             UnknownNameError: There is no such body.
@@ -110,7 +123,7 @@ class Character:
         return _index("body", name, self.body_names)
 
     def joint(self, name: str) -> int:
-        """Index of a ball joint by name, as in the joint part of a pose.
+        """Index of a ball joint by its name, in the order of `joint_names`.
 
         Raises:
             UnknownNameError: There is no such joint.
@@ -124,16 +137,16 @@ class Character:
         return tuple(pairs)
 
     def kinematics(self, poses: npt.ArrayLike) -> BodyStates:
-        """Positions and orientations of all bodies in all frames.
+        """Positions and orientations of all bodies in all frames, in the world.
 
         Args:
             poses: (frames, 59), or one pose (59,), which counts as one frame.
 
         Returns:
-            Body states with as many frames.
+            The states, with the same number of frames.
 
         Raises:
-            MotionError: The poses have another width.
+            MotionError: The poses have another shape.
         """
         # Numba takes a third of a second to import, the kernel a second when first compiled.
         from dynresp.motion.kinematics_kernel import kinematics_kernel
@@ -176,7 +189,7 @@ class Character:
 
 @functools.cache
 def default_character() -> Character:
-    """The product's own character, loaded once."""
+    """The default character, loaded once."""
     return Character()
 
 

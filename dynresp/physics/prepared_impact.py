@@ -15,6 +15,7 @@ from dynresp.physics.impacts import Ball, Impact, Punch, Push, Strike
 from dynresp.physics.scene import ImpactorKind, PhysicsConfig
 from dynresp.support.errors import SpecError
 
+# Acceleration of gravity [m/s2].
 GRAVITY = 9.81
 # A ball or a fist starts this long before it is due [s], or with its surface this far from the
 # target [m], whichever is earlier, so that it does not touch the character when the simulation

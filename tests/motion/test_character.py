@@ -79,7 +79,7 @@ class TestIdentity:
             ('<joint name="neck" range="0 75"/>', '<joint name="neck" type="hinge"/>', "13 ball"),
             ('name="neck" range', 'name="neck" pos="0 0 0.1" range', "at its origin"),
             ('name="head" pos="0 0 0.2188"', 'name="head" pos="0 0 0.2" euler="0 9 0"', "aligned"),
-            ("</mujoco>", "", "no MuJoCo model"),
+            ("</mujoco>", "", "not a MuJoCo model"),
         ],
     )
     def test_other_layouts_are_refused(
