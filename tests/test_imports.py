@@ -23,7 +23,7 @@ FLOORS = (
     {"bench"},
     {"cli"},
 )
-"""From the ground up. A package imports from floors below its own; a floor's packages are apart."""
+"""Lowest first. A package imports from lower floors only; packages of one floor are independent."""
 
 FLOOR = {package: floor for floor, packages in enumerate(FLOORS) for package in packages}
 

@@ -188,7 +188,7 @@ def run_metrics(run: AvatarRun) -> dict[str, Any]:
 def foot_slide(motion: Motion, character: Character) -> dict[str, float] | None:
     """How far feet slide in a stance [m]: `median`, `percentile_95`, `worst`; 0 without a stance.
 
-    None if the motion has less than 10 frames a second: too few to tell.
+    None if the motion has less than 10 frames a second: too few to find stances.
     """
     if motion.fps < _MIN_SLIDE_FPS:
         return None

@@ -1,4 +1,4 @@
-"""A walk by choice: every few seconds somebody picks one of a few actions."""
+"""A walk by choice: every few seconds the user picks one of a few actions."""
 
 from __future__ import annotations
 

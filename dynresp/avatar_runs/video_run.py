@@ -53,7 +53,7 @@ class VideoSettings:
         fps: Pictures a second.
         seconds: Longest time to follow [s].
         length: Number of pictures; None if it is not known.
-        seed: Seed of where the avatar begins, and of what it does while it sees nobody.
+        seed: Seed of where the avatar begins, and of what it does while nobody is visible.
         stop: Whether to stop; called before each picture, once there is something to follow.
         ended: Called when no more pictures are awaited.
     """

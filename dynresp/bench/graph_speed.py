@@ -153,7 +153,7 @@ def _check_agreement(
     """
     found = find_jumps(database, LOOSE)
     matched = found.targets - 1
-    farthest = LOOSE.max_distance - _ROUNDING
+    limit = LOOSE.max_distance - _ROUNDING
     for block in blocks:
         distances = block.distances[1:-1]
         own = (found.sources >= block.start) & (found.sources < block.start + len(distances))
@@ -161,8 +161,8 @@ def _check_agreement(
         pairs = found.sources[own] - block.start, matched[own]
         kept, uncertain = np.zeros((2, *distances.shape), dtype=bool)
         kept[pairs] = True
-        uncertain[pairs] = found.distances[own] > farthest
-        surely = pruning.jumps(block, _ROUNDING) & (distances < farthest)
+        uncertain[pairs] = found.distances[own] > limit
+        surely = pruning.jumps(block, _ROUNDING) & (distances < limit)
         perhaps = pruning.jumps(block, -_ROUNDING) | uncertain
         wrong = int(np.count_nonzero((surely & ~kept) | (kept & ~perhaps)))
         if wrong:
@@ -173,7 +173,7 @@ def _check_agreement(
 
 
 def _memory(database: MotionDatabase) -> dict[str, float]:
-    """Peak memory of a fresh process that builds a graph [MiB]; empty where nothing tells it."""
+    """Peak memory of a fresh process that builds a graph [MiB]; empty where it is unknown."""
     if not sys.platform.startswith("linux"):
         return {}
     context = multiprocessing.get_context("spawn")

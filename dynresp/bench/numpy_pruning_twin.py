@@ -114,6 +114,6 @@ class NumpyPruning:
         return least
 
     def _same_clip(self, frames: npt.NDArray[np.intp], shift: int) -> BoolArray:
-        """Whether frames lie in one clip with those a little before or after them."""
+        """Whether frames are in one clip with those a little before or after them."""
         shifted = np.clip(frames + shift, 0, len(self.clip_of) - 1)
         return self.clip_of[frames] == self.clip_of[shifted]

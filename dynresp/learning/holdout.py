@@ -85,7 +85,7 @@ class Split:
             count: How many folds.
 
         Returns:
-            (n,) from 0 to `count` - 1. Two samples of one class that has no others lie in
+            (n,) from 0 to `count` - 1. Two samples of one class that has no others are in
             different folds.
         """
         order = np.lexsort((self._random(index, _SEARCHED), np.asarray(labels)))

@@ -161,7 +161,7 @@ class ArchiveFormat:
         self.fail(path, f"is larger than {self.max_bytes / 2**20:g} MiB; cut the {self.what}")
 
     def _check_archive(self, path: Path, file: BinaryIO) -> None:
-        """Refuse what is no small zip archive, before the zip library reads its directory."""
+        """Refuse a file that is no small zip archive, before zipfile reads its directory."""
         size = file.seek(0, os.SEEK_END)
         if size > self.max_bytes:
             self._fail_as_too_large(path)

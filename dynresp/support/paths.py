@@ -1,6 +1,6 @@
 """Where dynresp finds the data that it ships, and where it keeps what it fetches.
 
-`models` and `reactions` lie beside the package in a checkout, and inside it, at
+`models` and `reactions` are beside the package in a checkout, and inside it, at
 ``dynresp/_data``, in an installed wheel.
 """
 
@@ -23,7 +23,7 @@ CACHE_VARIABLE = "DYNRESP_CACHE"
 def data_folder(name: str, package: Path = PACKAGE_FOLDER) -> Path:
     """Find a folder of shipped data, in a plain install and in an editable checkout alike.
 
-    The folder beside the package counts only where `pyproject.toml` lies there too: in
+    The folder beside the package counts only where `pyproject.toml` is there too: in
     `site-packages` a folder called `models` would be somebody else's.
 
     Args:

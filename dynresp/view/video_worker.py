@@ -1,4 +1,4 @@
-"""Draws a video in a process of its own: `python -m dynresp.view.video_worker SCRIPT.npz OUT.mp4`.
+"""Draw a video in a separate process: `python -m dynresp.view.video_worker SCRIPT.npz OUT.mp4`.
 
 `dynresp.view.video_writer` starts it with `MUJOCO_GL` set, since MuJoCo reads that once, on import.
 A line on standard output that begins with `PROGRESS` is frames done and frames in all, others are
@@ -19,7 +19,7 @@ from dynresp.support import paths
 from dynresp.support.extras import require
 
 PROGRESS = "dynresp-video"
-"""First word of a line that tells progress."""
+"""First word of a line that reports progress."""
 
 # Frames between two lines on standard output.
 _REPORT_EVERY = 5
