@@ -12,7 +12,7 @@ SceneMaker = Callable[[ImpactorKind], Scene]
 
 @pytest.fixture(scope="session")
 def config() -> PhysicsConfig:
-    """The settings that the product simulates with."""
+    """The default settings."""
     return PhysicsConfig()
 
 

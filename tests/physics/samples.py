@@ -1,4 +1,4 @@
-"""Motions and simulations that the tests of the physics make themselves."""
+"""Motions and simulations for the tests of physics."""
 
 import copy
 from collections.abc import Sequence
@@ -79,7 +79,7 @@ def punching(character: Character, seconds: float = 1.5, fps: float = FPS) -> Mo
 
 
 def beyond_bounds(impact: ImpactType, **values: float) -> ImpactType:
-    """The impact with numbers that it would refuse, such as make a simulation blow up."""
+    """An impact with numbers that it would refuse, for simulations that diverge."""
     changed = copy.copy(impact)
     for name, value in values.items():
         object.__setattr__(changed, name, value)

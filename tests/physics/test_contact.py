@@ -1,4 +1,4 @@
-"""Where and when the first contact is found, and what it does."""
+"""Where and when the first contact is found, and its effect."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -81,7 +81,7 @@ def test_a_miss_ends_without_contact(character: Character, scene_of: SceneMaker)
         assert trace.diverged is None
         waited = (len(trace.poses) - 1) / base.fps - setup.impact.due_s
         assert 0.2 <= waited + 1e-9 < 0.2 + 1.0 / base.fps + 1e-9
-        # The character goes on undisturbed, held to the base motion.
+        # The character goes on as before, held to the base motion.
         off = trace.poses[:, :3] - setup.base[: len(trace.poses), :3]
         assert np.abs(off).max() < 0.03
 
@@ -92,7 +92,7 @@ def _first(trace: Trace) -> Contact:
 
 
 def _in_facing_frame(trace: Trace, points: FloatArray) -> FloatArray:
-    """Points as the character sees them at contact: ahead, to its left, up, from its pelvis."""
+    """Points relative to the pelvis at contact: ahead, to the left, up."""
     root = trace.poses[_first(trace).frame]
     back = rotations.from_yaw(-rotations.yaw_of(root[ROOT_QUAT]))
     seen: FloatArray = rotations.rotate(back, points - root[:3])
@@ -104,7 +104,7 @@ def _in_facing_frame(trace: Trace, points: FloatArray) -> FloatArray:
 def test_the_radius_is_where_contact_is(
     character: Character, scene_of: SceneMaker, high: Motion, radius: float, target: str
 ) -> None:
-    """The ball is as large as it is told to be, against bodies of one geom and of two."""
+    """The ball has the radius that is set, against bodies of one geom and of two."""
     ball = Ball(1.5, speed=6.0, radius=radius, target=target)
     simulation = simulation_of(scene_of(ImpactorKind.PROJECTILE), high, [ball])
     trace = simulation.look_ahead(0.1)[0]
@@ -127,7 +127,7 @@ def test_a_larger_ball_touches_earlier_and_a_small_one_slips_by(
     beside = [Ball(1.5, speed=5.0, radius=radius, offset=0.5) for radius in radii]
     simulation = simulation_of(scene_of(ImpactorKind.PROJECTILE), high, impacts + beside)
     traces = simulation.look_ahead(0.05)
-    # From when each is due: larger balls are let go earlier.
+    # Relative to the due time: larger balls start earlier.
     times = [
         _first(trace).time_s - setup.impact.due_s
         for trace, setup in zip(traces[:4], simulation.setups, strict=False)
@@ -147,7 +147,7 @@ def test_the_batch_collides_like_a_model_compiled_with_that_ball(
     radius: float,
     scene_of: SceneMaker,
 ) -> None:
-    """The first frame, in which the ball is put anywhere, finds contact or not as MuJoCo does."""
+    """With the ball anywhere, the first frame finds contact if MuJoCo does."""
     base = standing(character)
     plain = setups_of(character, base, [Ball(1.0, radius=radius)], config)[0]
     model = compile_for(character, plain.impact, config, tmp_path)
@@ -171,7 +171,7 @@ def test_the_batch_collides_like_a_model_compiled_with_that_ball(
 
 
 class TestMomentum:
-    """In the air, what the impactor loses is what the character gains, but for gravity."""
+    """In the air the character gains what the impactor loses, apart from gravity."""
 
     @staticmethod
     def _of_character(character: Character, trace: Trace, frame: int) -> FloatArray:
@@ -219,7 +219,7 @@ class TestMomentum:
         assert given[0] / given[1] == pytest.approx(0.5, abs=0.05)
 
 
-def test_gravity_leaves_a_fist_alone(
+def test_gravity_does_not_act_on_a_fist(
     character: Character, scene_of: SceneMaker, high: Motion
 ) -> None:
     impacts = [Punch(1.5, offset=2.0), Ball(1.5, offset=2.0)]
@@ -235,7 +235,7 @@ def test_gravity_leaves_a_fist_alone(
 
 @pytest.mark.parametrize("yaw", [0.0, 2.2, -1.0])
 @pytest.mark.parametrize("impact_type", [Ball, Punch])
-def test_comes_from_the_side_it_is_told_to(
+def test_comes_from_the_given_direction(
     character: Character, scene_of: SceneMaker, impact_type: type[Ball], yaw: float
 ) -> None:
     base = walking(character, yaw=yaw)
@@ -251,7 +251,7 @@ def test_comes_from_the_side_it_is_told_to(
     assert touch["behind"][0] < -0.05
     assert touch["left"][1] > 0.1
     assert touch["right"][1] < -0.1
-    # A tenth of a second later the chest has gone the other way.
+    # A tenth of a second later the chest has moved to the opposite side.
     pushed = {}
     for name, trace in traces.items():
         chest = character.kinematics(trace.poses).centers[:, character.body("chest")]

@@ -1,4 +1,4 @@
-"""A simulation that blows up is reported, and takes no other down."""
+"""A simulation that diverges is reported, and changes no other."""
 
 import subprocess
 import sys
@@ -55,14 +55,14 @@ def test_is_reported_and_leaves_the_others_alone(
         _same(one, other)
 
 
-def test_a_push_can_blow_up_too(scene_of: SceneMaker, base: Motion) -> None:
+def test_a_push_can_diverge_too(scene_of: SceneMaker, base: Motion) -> None:
     pushes = [Push(1.0), beyond_bounds(Push(1.0), force=1e9), Push(1.1)]
     traces = simulation_of(scene_of(ImpactorKind.NONE), base, pushes).look_ahead(0.3)
     assert [trace.diverged is not None for trace in traces] == [False, True, False]
 
 
 def test_it_is_reported_each_time(scene_of: SceneMaker, base: Motion) -> None:
-    """MuJoCo resets a simulation that blew up, and its count of warnings with it."""
+    """MuJoCo resets a simulation that diverged, and its count of warnings."""
     push = beyond_bounds(Push(1.0), force=1e9)
     simulation = simulation_of(scene_of(ImpactorKind.NONE), base, [push])
     first = simulation.look_ahead(0.3)[0]
@@ -73,13 +73,13 @@ def test_it_is_reported_each_time(scene_of: SceneMaker, base: Motion) -> None:
         assert np.abs(again.poses[:, :3]).max() < 10.0
 
 
-def test_all_may_blow_up(scene_of: SceneMaker, base: Motion) -> None:
+def test_all_may_diverge(scene_of: SceneMaker, base: Motion) -> None:
     traces = simulation_of(scene_of(ImpactorKind.PROJECTILE), base, [_ABSURD] * 3).look_ahead(0.3)
     assert all(trace.diverged is not None for trace in traces)
 
 
-def test_on_the_way_back_is_reported_with_its_own_frame(scene_of: SceneMaker, base: Motion) -> None:
-    """Targets that are no numbers stand for whatever may go wrong then."""
+def test_after_a_rewind_is_reported_with_its_own_frame(scene_of: SceneMaker, base: Motion) -> None:
+    """Targets that are NaN stand for all that may go wrong."""
     scene = scene_of(ImpactorKind.PROJECTILE)
     simulation = simulation_of(scene, base, _SANE[:2])
     simulation.look_ahead(0.5)
@@ -94,7 +94,7 @@ def test_on_the_way_back_is_reported_with_its_own_frame(scene_of: SceneMaker, ba
     assert 13 + 5 <= blown.diverged.frame <= 13 + 8
     assert len(blown.poses) == blown.diverged.frame + 1
     assert np.isfinite(blown.poses).all()
-    # Back again, it goes on as if nothing had been.
+    # After another rewind it goes on normally.
     again = simulation.follow([1], [13], [sane], 12)[0]
     other = simulation_of(scene, base, _SANE[:2])
     other.look_ahead(0.5)
@@ -102,9 +102,7 @@ def test_on_the_way_back_is_reported_with_its_own_frame(scene_of: SceneMaker, ba
 
 
 @pytest.mark.parametrize("mass", [1e-6, 1e3, 1e9, 1e15])
-def test_a_mass_out_of_this_world_does_no_harm(
-    scene_of: SceneMaker, base: Motion, mass: float
-) -> None:
+def test_an_extreme_mass_does_no_harm(scene_of: SceneMaker, base: Motion, mass: float) -> None:
     trace = simulation_of(
         scene_of(ImpactorKind.PROJECTILE), base, [beyond_bounds(Ball(1.5), mass=mass)]
     ).look_ahead(0.3)[0]
@@ -143,6 +141,6 @@ def test_nothing_is_written_to_the_working_folder(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_nor_when_one_blows_up(tmp_path: Path) -> None:
+def test_nothing_is_written_when_one_diverges(tmp_path: Path) -> None:
     assert _run_in(tmp_path, "absurd_ball(1.5)") == "[False, True]"
     assert not list(tmp_path.iterdir())

@@ -16,7 +16,7 @@ def table(text: str) -> ImpactTable:
     return parse_experiment(tomllib.loads(content)).impact[0]
 
 
-def test_units_come_off_the_names() -> None:
+def test_keys_with_units_become_attributes() -> None:
     ball = table(
         'kind="ball"\ntime_s=1\nmass_kg=5\nradius_m=0.1\nspeed_m_s=9\nfrom_deg=90\n'
         'elevation_deg=20\ntarget="head"\nheight_m=1.5\noffset_m=0.1'
@@ -28,7 +28,7 @@ def test_units_come_off_the_names() -> None:
     assert hit.impact == Push(1.0, 500.0, 0.3, 0.0, 0.0, "pelvis")
 
 
-def test_what_is_left_out_is_the_default_of_the_physics() -> None:
+def test_missing_keys_have_the_defaults_of_the_impact() -> None:
     for kind, default in (("ball", Ball(1.0)), ("punch", Punch(1.0)), ("push", Push(1.0))):
         (hit,) = draw_hits(table(f'kind="{kind}"\ntime_s=1'), 0, range(1))
         assert hit.impact == default

@@ -1,4 +1,4 @@
-"""What impacts are prepared as: flight, direction, timing, and the push."""
+"""Impacts and their preparation: flight, direction, timing, and the push."""
 
 import math
 from dataclasses import replace
@@ -26,7 +26,7 @@ def base(character: Character) -> Motion:
 
 
 def _without_character(scene_of: SceneMaker, setups: list[Setup]) -> list[Trace]:
-    """The impacts' flight with the character taken out of the way."""
+    """The flight of impacts with the character far away."""
     away = np.zeros(59)
     away[:2] = 50.0
     moved = [replace(setup, base=setup.base + away) for setup in setups]
@@ -34,7 +34,7 @@ def _without_character(scene_of: SceneMaker, setups: list[Setup]) -> list[Trace]
 
 
 def _when_due(trace: Trace, impact: PreparedImpact, fps: float) -> tuple[FloatArray, FloatArray]:
-    """Where the impactor is when it is due, and its velocity then."""
+    """Position and velocity of the impactor when it is due."""
     assert trace.impactor is not None
     path, at = trace.impactor[:, :3], impact.due_s * fps
     low = int(at)
@@ -137,7 +137,7 @@ class TestTiming:
     """When the simulation begins and the impact is due."""
 
     @pytest.mark.parametrize("time", [0.2, 0.2001, 0.7, 1.0, 1.0333, 2.95, 3.0])
-    def test_an_impactor_is_let_go_before(
+    def test_an_impactor_starts_before(
         self, character: Character, config: PhysicsConfig, base: Motion, time: float
     ) -> None:
         for impact in (Ball(time), Punch(time), Strike(time, punching(character), 0.6)):
@@ -193,9 +193,7 @@ class TestTiming:
         (Push, {"time": 1.0, "force": math.nan}),
     ],
 )
-def test_refuses_numbers_that_make_no_sense(
-    impact_type: type[Ball], numbers: dict[str, float]
-) -> None:
+def test_refuses_numbers_out_of_bounds(impact_type: type[Ball], numbers: dict[str, float]) -> None:
     wrong = list(numbers)[-1]
     with pytest.raises(SpecError, match=wrong):
         impact_type(**numbers)
@@ -285,7 +283,7 @@ class TestPush:
         np.testing.assert_allclose(trace.contact.point, chest, atol=0.01)
 
     def test_goes_on_after_a_rewind(self, character: Character, scene_of: SceneMaker) -> None:
-        """A push that is not over at the exit is finished while other targets are followed."""
+        """A push that is not over at the exit goes on while other targets are tracked."""
         high = standing(character).moved(0.0, (0.0, 0.0, 8.0))
         push = Push(1.0, 400.0, 0.4)
         simulation = simulation_of(scene_of(ImpactorKind.NONE), high, [push])
@@ -298,7 +296,7 @@ class TestPush:
 
 
 def test_sphere_inertia_is_that_of_a_solid_ball(rng: np.random.Generator) -> None:
-    """Against the mean of points all over a ball."""
+    """Against the mean of points in a ball."""
     points = rng.uniform(-0.3, 0.3, size=(400_000, 3))
     inside = points[np.linalg.norm(points, axis=1) <= 0.3]
     mean = 5.0 * float(np.mean(inside[:, 0] ** 2 + inside[:, 1] ** 2))

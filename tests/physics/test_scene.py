@@ -1,4 +1,4 @@
-"""The character in its world: joint stops, limits, and what of it touches what."""
+"""The character in its scene: joint stops, limits, and collisions of its bodies."""
 
 import mujoco
 import numpy as np
@@ -53,7 +53,7 @@ class TestLayout:
 
 
 def _passive_torque(model: mujoco.MjModel, pose: np.ndarray, joint: str) -> np.ndarray:
-    """Torque (3,) that limits and stops put on a joint, in the air, at rest, servos slack."""
+    """Torque (3,) of limits and stops on a joint, in the air, at rest, without servo torque."""
     data = mujoco.MjData(model)
     data.qpos[:59] = pose
     data.qpos[2] += 10.0
@@ -66,12 +66,12 @@ def _passive_torque(model: mujoco.MjModel, pose: np.ndarray, joint: str) -> np.n
 
 
 class TestStops:
-    """Knees and elbows bend one way; forearms turn freely."""
+    """Knees and elbows bend in one direction; forearms turn freely."""
 
-    # Which way about +Y is the wrong way: a knee's shank forward, an elbow's forearm backward.
+    # The wrong direction about +Y: a knee's shank forward, an elbow's forearm backward.
     @pytest.mark.parametrize(("joint", "wrong"), [("knee", -1.0), ("elbow", 1.0)])
     @pytest.mark.parametrize("side", ["left", "right"])
-    def test_bending_the_wrong_way_is_resisted(
+    def test_bending_in_the_wrong_direction_is_resisted(
         self, character: Character, scene_of: SceneMaker, side: str, joint: str, wrong: float
     ) -> None:
         model, name = scene_of(ImpactorKind.NONE).model, f"{side}_{joint}"
@@ -109,7 +109,7 @@ class TestStops:
     def test_each_joint_stops_at_its_range(
         self, character: Character, scene_of: SceneMaker, axis: tuple[float, float, float]
     ) -> None:
-        """Turned 3 degrees farther than its range it is pushed back, within it it is not.
+        """It is pushed back 3 degrees beyond its range, and not within it.
 
         About axes that bring no body into another.
         """
@@ -128,7 +128,7 @@ class TestStops:
 
 
 def _touching(model: mujoco.MjModel, poses: np.ndarray, lift: float) -> list[set[tuple[str, str]]]:
-    """Pairs of the character's bodies that touch each other, pose by pose."""
+    """Pairs of the character's bodies that touch each other, for each pose."""
     data, touching = mujoco.MjData(model), []
     for pose in poses:
         data.qpos[:59] = pose
@@ -165,7 +165,7 @@ class TestSelfCollision:
         motion = load_builtin(name, character)
         touching = _touching(scene_of(ImpactorKind.NONE).model, motion.poses[::4], 3.0)
         share = sum(bool(pairs) for pairs in touching) / len(touching)
-        # Who falls, rolls or guards the head lays the arms against the body.
+        # In falls, rolls and guards of the head the arms touch the body.
         at_ease = motion.labels[0].name in ("walk", "idle")
         assert share <= (0.0 if at_ease else 0.6), sorted(set().union(*touching))
 

@@ -1,4 +1,4 @@
-"""The servos: their gains, what they track, and how far they stand alone."""
+"""The servos: their gains, how they track, and how long they keep a character standing."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,7 @@ from tests.physics.samples import about_y, setups_of, standing, turned, walking
 def _tracked(
     character: Character, config: PhysicsConfig, base: Motion, folder: Path, *, held: bool
 ) -> Stepped:
-    """The base motion tracked from beginning to end, and a push that never comes."""
+    """Track the base motion from beginning to end; the push never comes."""
     push = setups_of(character, base, [Push(0.0)], config)[0].impact
     prepared = replace(push, push_start_s=1e6)
     slow = SlowSimulation(character, Setup(base.poses, prepared), config, folder, held)
@@ -52,7 +52,7 @@ class TestGains:
     """Stiffness from inertia and frequency, with floors."""
 
     def test_inertia_is_what_mujocos_mass_matrix_says(self, character: Character) -> None:
-        """The joint's own block of the joint-space inertia, less armature."""
+        """The joint's own block of the joint-space inertia, without armature."""
         model, data = character.model, mujoco.MjData(character.model)
         mujoco.mj_forward(model, data)
         whole = np.zeros((model.nv, model.nv))
@@ -127,7 +127,7 @@ def test_the_documented_table_is_that_of_the_code(character: Character) -> None:
     assert table in text, f"the table in docs/physics.md should be\n{table}"
 
 
-def test_the_servo_pulls_along_the_shortest_way(
+def test_the_servo_pulls_in_the_shortest_direction(
     character: Character, scene_of: SceneMaker, rng: np.random.Generator
 ) -> None:
     """Torque kp log(q^-1 q_target) in the child's frame, at rest and below its limit."""
@@ -151,7 +151,7 @@ def test_the_servo_pulls_along_the_shortest_way(
 def test_torque_limits_are_kept(
     character: Character, config: PhysicsConfig, tmp_path: Path
 ) -> None:
-    """Targets that jump ask for far more than the servos may give."""
+    """Targets that jump need far more torque than the limits allow."""
     poses = turned(character, {}, 31)
     rng = np.random.default_rng(3)
     poses[5:, JOINTS] = rotations.from_rotation_vector(rng.normal(size=(26, 13, 3))).reshape(26, -1)
@@ -164,7 +164,7 @@ def test_torque_limits_are_kept(
 
 
 class TestTracking:
-    """How close the held character stays to what it tracks."""
+    """How close the held character stays to its targets."""
 
     def test_standing(self, character: Character, config: PhysicsConfig, tmp_path: Path) -> None:
         base = standing(character, 2.0)
@@ -187,11 +187,11 @@ class TestTracking:
         # The synthetic walk slides its feet, which the floor resists.
         assert np.percentile(errors, 95) < (8.0 if height == 0.0 else 2.0)
         assert errors.max() < (30.0 if height == 0.0 else 4.0)
-        # As good at the end as in the beginning.
+        # The end is as good as the beginning.
         third = len(errors) // 3
         assert errors[-third:].mean() < 1.2 * errors[third : 2 * third].mean() + 0.1
 
-    def test_the_lead_takes_out_the_lag(
+    def test_the_lead_cancels_the_lag(
         self, character: Character, config: PhysicsConfig, tmp_path: Path
     ) -> None:
         """A steady swing in the air is tracked without delay, whatever its speed."""
@@ -205,10 +205,10 @@ class TestTracking:
             for name in ("left_shoulder", "right_hip"):
                 assert errors[steady, character.joint(name)].max() < 2.0
 
-    def test_does_not_chatter(
+    def test_does_not_oscillate(
         self, character: Character, config: PhysicsConfig, tmp_path: Path
     ) -> None:
-        """Held still, nothing turns; not the light feet either."""
+        """Held still, nothing turns, not even the light feet."""
         base = standing(character, 3.0)
         for lift in (0.0, 1.0):
             moved = base.moved(0.0, (0.0, 0.0, lift))
@@ -216,10 +216,10 @@ class TestTracking:
             late = np.array(seen.velocities)[60:]
             assert np.abs(late[:, 6:]).max() < 0.02
 
-    def test_after_a_hard_hit_no_joint_is_driven_to_and_fro(
+    def test_after_a_hard_hit_no_joint_oscillates(
         self, character: Character, config: PhysicsConfig, tmp_path: Path
     ) -> None:
-        """A second after the hit, in the air, all has calmed down to its targets."""
+        """A second after the hit, in the air, all joints are at their targets."""
         base = standing(character, 4.0).moved(0.0, (0.0, 0.0, 20.0))
         ball = Ball(1.0, speed=14.0, mass=8.0, target="head", from_deg=60.0)
         setup = setups_of(character, base, [ball], config)[0]
@@ -230,10 +230,10 @@ class TestTracking:
         assert speeds[-10:].max() < 0.5
 
 
-def test_stands_for_a_while_without_being_held(
+def test_stands_for_half_a_second_without_being_held(
     character: Character, config: PhysicsConfig, tmp_path: Path
 ) -> None:
-    """Servos alone balance nobody for good; half a second is what a look-ahead needs."""
+    """Servos alone do not balance for long; a look-ahead needs half a second."""
     base = standing(character, 1.0)
     seen = _tracked(character, config, base, tmp_path, held=False)
     place, turn = _root_errors(seen, base)

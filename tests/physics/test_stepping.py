@@ -1,4 +1,4 @@
-"""A batch is bitwise what a plain loop of `mj_step` is, alone or not, on any number of threads."""
+"""A batch has the same bits as a plain loop of `mj_step`, alone or not, on any threads."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ HORIZON_S = 0.4
 
 
 def _impacts(kind: ImpactorKind, character: Character) -> list[Impact]:
-    """Some of a kind that begin and hit at different times."""
+    """Impacts of one kind that begin and hit at different times."""
     if kind is ImpactorKind.PROJECTILE:
         return [
             Ball(1.5),
@@ -53,7 +53,7 @@ def _same_traces(some: Sequence[Trace], others: Sequence[Trace]) -> None:
 
 
 def _length(slow: SlowSimulation, contact_step: int | None) -> int:
-    """Frames that the look-ahead is to run, from the plain loop's own contact."""
+    """Frames of the look-ahead, from the contact in the plain loop."""
     if contact_step is None:
         return slow.frames_until_miss
     first_after = -(-contact_step // slow.config.substeps)
@@ -98,7 +98,7 @@ def test_a_batch_equals_a_plain_loop(
             assert trace.contact.force == pytest.approx(max(seen.forces.values()), rel=1e-9)
 
 
-def test_alone_is_as_in_a_batch_in_any_order(
+def test_alone_equals_a_batch_in_any_order(
     character: Character, scene_of: SceneMaker, kind: ImpactorKind, base: Motion
 ) -> None:
     scene, impacts = scene_of(kind), _impacts(kind, character)
@@ -109,7 +109,7 @@ def test_alone_is_as_in_a_batch_in_any_order(
     _same_traces(together, alone)
 
 
-def test_another_rate_and_another_count_of_steps(
+def test_another_frame_rate_and_number_of_steps(
     character: Character, base: Motion, tmp_path: Path
 ) -> None:
     config = PhysicsConfig(fps=50.0, substeps=5)
@@ -144,7 +144,7 @@ def _contact_frames(simulation: Simulation) -> list[int]:
 
 
 class TestRewind:
-    """Going back to a frame and on from there."""
+    """Going back to a frame, and on from there."""
 
     @pytest.fixture
     def hits(self, kind: ImpactorKind, character: Character) -> list[Impact]:
@@ -155,7 +155,7 @@ class TestRewind:
         """Targets that are not the base motion."""
         return walking(character, speed=0.3).poses[11:30]
 
-    def test_equals_a_plain_loop_that_starts_anew(
+    def test_equals_a_plain_loop_that_starts_again(
         self,
         character: Character,
         config: PhysicsConfig,
@@ -219,7 +219,7 @@ class TestRewind:
         again.look_ahead(HORIZON_S)
         frames = _contact_frames(once)
         rows = list(range(len(hits)))
-        # First off to somewhere else, then back to an earlier frame.
+        # First along other targets, then back to an earlier frame.
         again.follow(rows, [frame + 3 for frame in frames], [others[::-1]] * len(rows), 4)
         a = once.follow(rows, frames, [others] * len(rows), 9)
         b = again.follow(rows, frames, [others] * len(rows), 9)
@@ -242,10 +242,10 @@ class TestRewind:
         b0 = two.follow([0], [frames[0] + 2], [others[3:]], 6)
         b1 = two.follow([1], [frames[1]], [others], 6)
         _same_traces(a, [*b1, *b0])
-        # What was not followed is as it was.
+        # Simulations that did not go back are unchanged.
         np.testing.assert_array_equal(a[0].poses[: frames[1] + 1], kept[1].poses[: frames[1] + 1])
 
-    def test_some_rows_are_as_all_together(
+    def test_some_rows_equal_all_together(
         self,
         scene_of: SceneMaker,
         kind: ImpactorKind,
@@ -289,7 +289,7 @@ def test_the_character_starts_with_the_base_motions_velocities(
     for trace, setup in zip(traces, setups, strict=True):
         start = setup.impact.start
         np.testing.assert_array_equal(trace.poses[0], base.poses[start])
-        # Within what the movement changes in half a frame.
+        # Within the change of the movement in half a frame.
         np.testing.assert_allclose(trace.velocities[0], base.velocities()[start], atol=0.4)
         speed = np.linalg.norm(trace.velocities[0, :2])
         assert speed == pytest.approx(1.7, rel=1e-6)
@@ -309,7 +309,7 @@ def test_a_setup_of_one_frame_runs(
     np.testing.assert_array_equal(a.poses, b.poses)
 
 
-def test_frames_run_in_one_go_are_those_run_one_by_one(
+def test_frames_run_in_one_call_equal_frames_run_one_by_one(
     scene_of: SceneMaker, base: Motion, kind: ImpactorKind, character: Character
 ) -> None:
     simulation = simulation_of(scene_of(kind), base, _impacts(kind, character), 1)
@@ -325,7 +325,7 @@ def test_frames_run_in_one_go_are_those_run_one_by_one(
         again.go_on([i], left - 4)
         np.testing.assert_array_equal(again.trace(i).poses, trace.poses)
         np.testing.assert_array_equal(again.trace(i).velocities, trace.velocities)
-        # And gone back to contact it goes the same way again.
+        # Back at the contact it gives the same again.
         again.rewind(i, trace.contact.frame)
         again.go_on([i], 6)
         np.testing.assert_array_equal(
@@ -333,7 +333,7 @@ def test_frames_run_in_one_go_are_those_run_one_by_one(
         )
 
 
-def test_a_simulation_put_where_another_was_is_what_it_would_be_alone(
+def test_a_replaced_simulation_equals_one_alone(
     scene_of: SceneMaker, base: Motion, kind: ImpactorKind, character: Character
 ) -> None:
     impacts = _impacts(kind, character)
@@ -350,7 +350,7 @@ def test_a_simulation_put_where_another_was_is_what_it_would_be_alone(
     np.testing.assert_array_equal(traces[0].velocities, before.velocities)
 
 
-def test_a_simulation_that_blew_up_is_forgotten_when_it_is_replaced(
+def test_a_replacement_clears_a_divergence(
     scene_of: SceneMaker, base: Motion, character: Character
 ) -> None:
     kind = ImpactorKind.PROJECTILE
@@ -365,7 +365,7 @@ def test_a_simulation_that_blew_up_is_forgotten_when_it_is_replaced(
     np.testing.assert_array_equal(again.velocities, trace.velocities)
 
 
-def test_one_that_blows_up_while_going_on_says_in_which_frame(
+def test_a_divergence_while_going_on_has_its_frame(
     scene_of: SceneMaker, base: Motion, character: Character
 ) -> None:
     kind = ImpactorKind.PROJECTILE
@@ -374,7 +374,7 @@ def test_one_that_blows_up_while_going_on_says_in_which_frame(
     for simulation in (one_by_one, at_once):
         while simulation.contact(0) is None:
             simulation.approach([0])
-        # So fast that it goes wrong only after some frames.
+        # So fast that it diverges only after some frames.
         simulation._batch.bind("qvel")[0, :3] = 3e5
     for _ in range(20):
         if one_by_one.diverged(0) is None:

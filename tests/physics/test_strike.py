@@ -1,4 +1,4 @@
-"""A second character's strike: where it stands, and the arm that hits."""
+"""The strike of a second character: where it stands, and the arm that hits."""
 
 import math
 
@@ -61,7 +61,7 @@ def test_the_fist_is_over_its_target_when_it_is_due(
     fist = _at_due(_fists(character, prepared.strike_poses), prepared, base.fps)
     aim = character.kinematics(base.sample([time])).centers[0, character.body(target)]
     np.testing.assert_allclose(fist[:2], aim[:2], atol=0.03)
-    # It keeps its own height, and what is drawn is the placed character's own forearm.
+    # It keeps its own height, and the striker is the forearm of the placed character.
     own = motion.sample([0.6])
     height = character.kinematics(own)
     forearm = character.body("right_forearm")
@@ -70,7 +70,7 @@ def test_the_fist_is_over_its_target_when_it_is_due(
     assert fist[2] == pytest.approx(_fists(character, there)[0, 2], abs=0.03)
     states = character.kinematics(prepared.opponent.poses)
     np.testing.assert_allclose(states.positions[:, forearm], prepared.strike_poses[:, :3])
-    # The opponent is on the side it comes from, and faces the character.
+    # The opponent is in the direction that the strike comes from, and faces the character.
     pose = base.sample([time])[0]
     bearing = float(rotations.yaw_of(pose[ROOT_QUAT])) + math.radians(from_deg)
     stands = _at_due(prepared.opponent.poses, prepared, base.fps)[:2] - aim[:2]
@@ -120,7 +120,7 @@ def _jab(character: Character, fast: float = 1.0) -> Motion:
 def _off_its_path(character: Character, scene: Scene, fast: float) -> tuple[FloatArray, int, float]:
     """How far the fist is from its path [m], the frame it is due in, and its top speed [m/s].
 
-    With the character out of the way, so that the whole strike is seen.
+    The character is far away, so that the strike is not stopped.
     """
     base = standing(character)
     strike = Strike(1.5, _jab(character, fast), 0.6)
@@ -147,15 +147,15 @@ def test_the_arm_follows_its_recorded_path_until_it_hits(
 
 
 @pytest.mark.parametrize(("fast", "worst"), [(1.0, 0.025), (1.6, 0.045), (2.2, 0.065)])
-def test_it_strays_little_however_fast_it_is(
+def test_it_leaves_its_path_little_at_any_speed(
     character: Character, scene_of: SceneMaker, fast: float, worst: float
 ) -> None:
-    """The weld that draws the arm gives way to its acceleration, as a shoulder does."""
+    """The weld that draws the arm is soft, like a shoulder."""
     off, due, _ = _off_its_path(character, scene_of(ImpactorKind.STRIKER), fast)
     assert off[: due + 1].max() < worst
 
 
-def test_it_meets_its_target_and_pushes_it(
+def test_it_hits_its_target_and_pushes_it(
     character: Character, scene_of: SceneMaker, base: Motion
 ) -> None:
     strike, slow = _jab(character), _jab(character, 0.4)
@@ -165,7 +165,7 @@ def test_it_meets_its_target_and_pushes_it(
     for trace, setup in zip(traces, simulation.setups, strict=True):
         assert trace.contact is not None
         assert trace.diverged is None
-        # The surface is met before the target's middle.
+        # The surface is hit before the centre of the target.
         assert -0.15 < trace.contact.time_s - setup.impact.due_s < 0.02
     hit = traces[0]
     assert hit.contact is not None
@@ -179,10 +179,10 @@ def test_it_meets_its_target_and_pushes_it(
     assert after < before - 0.3
 
 
-def test_the_strike_lasts_as_long_as_anything_may_follow_it(
+def test_the_strike_lasts_as_long_as_the_simulation(
     character: Character, config: PhysicsConfig, base: Motion
 ) -> None:
-    """The recorded path goes on after the due time, and the opponent stands when it has ended."""
+    """The recorded path goes on after the due time; the opponent stands when it has ended."""
     motion = punching(character)
     prepared = prepare(Strike(1.5, motion, motion.duration), base, character, config)
     assert prepared.strike_poses is not None

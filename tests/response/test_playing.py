@@ -65,7 +65,7 @@ def test_a_motion_given_in_pieces_plays_as_if_given_at_once(
 
 
 def _memory_of(work: Callable[[], object]) -> int:
-    """Largest memory that some work takes [bytes]; it shows what is copied."""
+    """Largest memory that a call needs [bytes]; it shows what is copied."""
     tracemalloc.start()
     try:
         work()
@@ -178,7 +178,7 @@ def test_a_motion_of_another_rate_or_of_the_past_is_refused(
         responder.play(walking(character, 1.0), 0)
 
 
-def test_a_second_hit_before_the_blend_has_ended_goes_on_with_a_moved_plan(
+def test_a_second_hit_during_the_blend_goes_on_with_a_moved_timeline(
     character: Character, library: ReactionLibrary
 ) -> None:
     crowd = _crowd(character, library, walking(character, 4.0))

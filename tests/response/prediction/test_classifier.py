@@ -79,7 +79,7 @@ def file(
 # -- what it predicts -------------------------------------------------------------------------
 
 
-def test_it_takes_its_own_features_by_name(classifier: Classifier, pipelines: Any) -> None:
+def test_it_selects_its_features_by_name(classifier: Classifier, pipelines: Any) -> None:
     rng = np.random.default_rng(0)
     features = np.full((40, len(FEATURE_NAMES)), np.nan, dtype=np.float32)
     features[:, 3:9] = rng.normal(size=(40, 6))
@@ -101,13 +101,13 @@ def test_features_that_are_not_finite(classifier: Classifier) -> None:
         classifier.rank(np.full((1, len(FEATURE_NAMES)), np.nan))
 
 
-# -- what it belongs to -----------------------------------------------------------------------
+# -- what it is trained for --------------------------------------------------------------------
 
 
 def test_it_is_refused_for_anything_else(classifier: Classifier) -> None:
     own = classifier.trained_for
     classifier.check(own)
-    # The name is for people: a library file may be moved.
+    # The name does not count: a library file may be moved.
     classifier.check(replace(own, library_name="renamed"))
     with pytest.raises(ClassifierError, match=rf"'tiny' \({'a' * 16}\), not for 'core'.*\(dddd\)"):
         classifier.check(replace(own, library_name="core", library="dddd"))
@@ -194,7 +194,7 @@ def changed(file: Path, out: Path, change: Callable[[dict[str, bytes]], None]) -
 
 
 def changed_key(key: str, value: Any) -> Callable[[dict[str, bytes]], None]:
-    """A change of what the file says; without a value, the key goes."""
+    """A change of the file's description; None removes the key."""
 
     def change(members: dict[str, bytes]) -> None:
         about = json.loads(members["classifier.json"])
@@ -302,7 +302,7 @@ def test_pipelines_that_are_not_trusted(
 
 
 def what_comes_of(read: Callable[[Path], Any], path: Path) -> Any:
-    """What is read, or the one error that it may be refused with."""
+    """What is read, or the only error that may be raised."""
     try:
         return read(path)
     except ClassifierError as error:

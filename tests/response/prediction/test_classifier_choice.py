@@ -1,4 +1,4 @@
-"""Choosing by prediction: against the oracle, with every budget, and in every order."""
+"""Choices by prediction: against the full search, with every budget, and in any order."""
 
 import numpy as np
 import pytest
@@ -57,7 +57,7 @@ def labelled(
 
 @pytest.fixture(scope="module")
 def classifier(character: Character, library: ReactionLibrary, labelled: HitLabels) -> Classifier:
-    """Trained on the very hits that it is asked about, so that it knows them."""
+    """Trained on the same hits that it then predicts."""
     from sklearn.decomposition import PCA
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -99,7 +99,7 @@ def _responses(
     return Responder(character, library, CONFIG, threads=1, chooser=chooser).respond(hits)
 
 
-def test_what_it_knows_it_answers_as_the_oracle_does(
+def test_on_its_training_hits_it_chooses_as_the_full_search(
     character: Character,
     library: ReactionLibrary,
     thrown: list[tuple[Motion, Impact]],
@@ -107,21 +107,21 @@ def test_what_it_knows_it_answers_as_the_oracle_does(
 ) -> None:
     chooser = ClassifierChooser(character, library, CONFIG, classifier)
     ours = _responses(character, library, thrown, chooser)
-    oracles = _responses(character, library, thrown, None)
-    same = [a.choice == b.choice for a, b in zip(ours, oracles, strict=True)]
+    searched = _responses(character, library, thrown, None)
+    same = [a.choice == b.choice for a, b in zip(ours, searched, strict=True)]
     assert np.mean(same) > 0.95
     assert len({response.choice for response in ours}) >= 3
-    for mine, other in zip(ours, oracles, strict=True):
+    for mine, other in zip(ours, searched, strict=True):
         if mine.choice is None or mine.choice != other.choice:
             continue
         assert mine.error is not None
         assert other.error is not None
-        # Between frames it can fit better than the oracle, which searches whole ones.
+        # Between frames it can fit better than the full search, which compares whole frames.
         assert mine.error < 1.1 * other.error + 0.01
         assert mine.graze == other.graze
 
 
-def test_two_aligned_are_no_worse_than_one(
+def test_two_aligned_choices_are_no_worse_than_one(
     character: Character,
     library: ReactionLibrary,
     thrown: list[tuple[Motion, Impact]],
@@ -146,7 +146,7 @@ def test_two_aligned_are_no_worse_than_one(
         assert b.choice == least or b.errors[CARRY_ON] > CONFIG.carry_on_max_error
 
 
-def test_each_is_what_it_would_be_alone(
+def test_each_choice_is_the_same_alone(
     character: Character,
     library: ReactionLibrary,
     thrown: list[tuple[Motion, Impact]],
@@ -165,7 +165,7 @@ def test_a_strategy_has_all_its_reactions_aligned(
     labelled: HitLabels,
     classifier: Classifier,
 ) -> None:
-    """Two classes alone: to carry on, and everything else."""
+    """Only two classes: no reaction, and all reactions."""
     import dataclasses
 
     from sklearn.decomposition import PCA
@@ -203,7 +203,7 @@ def test_a_strategy_has_all_its_reactions_aligned(
     assert seen > 5
 
 
-def test_a_graze_is_carried_on_whatever_is_predicted(
+def test_a_graze_gets_no_reaction_whatever_is_predicted(
     character: Character, library: ReactionLibrary, base: Motion, classifier: Classifier
 ) -> None:
     chooser = ClassifierChooser(character, library, CONFIG, classifier)
@@ -212,7 +212,7 @@ def test_a_graze_is_carried_on_whatever_is_predicted(
     assert response.choice == CARRY_ON
 
 
-def test_a_character_at_run_time_chooses_alike(
+def test_a_character_at_run_time_makes_the_same_choices(
     character: Character,
     library: ReactionLibrary,
     thrown: list[tuple[Motion, Impact]],
@@ -255,10 +255,10 @@ def test_a_classifier_for_something_else_is_refused(
         ClassifierChooser(character, library, CONFIG, other)
 
 
-def test_the_base_motions_fit_is_the_oracles(
+def test_the_base_motions_fit_is_that_of_the_full_search(
     character: Character, thrown: list[tuple[Motion, Impact]]
 ) -> None:
-    """Two ways to the same numbers: windows cut for a search, and the alignment's kernel."""
+    """Windows cut for a search and the alignment's kernel give the same numbers."""
     (batch,) = HitStage(character, CONFIG, 1).batches(thrown[:30])
     traces = batch.simulation.look_ahead(CONFIG.horizon_s)
     hits = look_ahead_of(character, CONFIG, batch.bases, batch.prepared, traces)

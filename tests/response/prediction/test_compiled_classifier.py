@@ -32,7 +32,7 @@ def machine(**settings: Any) -> SVC:
 
 @cache
 def trained(classes: int, components: int, seed: int, samples: int = 700) -> Pipeline:
-    """A pipeline trained on classes of very different frequency, with labels that are no range."""
+    """A pipeline trained on classes of very different frequency, whose labels have gaps."""
     rng = np.random.default_rng(seed)
     rows = draw(rng, samples)
     appeal = rows @ rng.normal(size=(FEATURES, classes)) / 40.0
@@ -110,7 +110,7 @@ def test_equal_to_the_twin(
 
 @pytest.mark.slow
 def test_equal_to_scikit_learn_on_a_hundred_thousand_inputs(rng: np.random.Generator) -> None:
-    """Whatever differs must be a near-tie: two scores that rounding alone can exchange."""
+    """What differs must be nearly a tie: two scores that rounding alone can exchange."""
     pipeline = trained(25, 24, 4, samples=1500)
     predictor = PairwiseQuadratic.from_pipeline(pipeline)
     rows = draw(rng, 100_000)
@@ -132,7 +132,7 @@ def test_equal_to_scikit_learn_on_a_hundred_thousand_inputs(rng: np.random.Gener
     classes=st.integers(2, 9), values=st.sampled_from([1, 2, 1000]), seed=st.integers(0, 2**32 - 1)
 )
 def test_the_best_are_those_of_all_pairs(classes: int, values: int, seed: int) -> None:
-    """Votes as random as can be are full of circles; few values make confidences tie as well."""
+    """Random votes have many circles; with few values confidences are equal, too."""
     rng = np.random.default_rng(seed)
     pairs = classes * (classes - 1) // 2
     decisions = rng.integers(-values, values, size=pairs, endpoint=True).astype(float)
@@ -161,7 +161,7 @@ def test_a_circle_of_three(decisions: list[float], expected: list[int]) -> None:
         assert predictor.rank([7.0], best)[0].tolist() == expected[:best]
 
 
-def test_circles_at_every_place() -> None:
+def test_circles_at_every_rank() -> None:
     """Nine classes, three circles: each circle beats all of the next."""
     classes, decisions = 9, []
     for i in range(classes):
@@ -221,7 +221,7 @@ def test_arrays_are_read_only() -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
-def test_features_that_are_no_measurement(value: float, rng: np.random.Generator) -> None:
+def test_features_that_are_not_plausible(value: float, rng: np.random.Generator) -> None:
     predictor = PairwiseQuadratic.from_pipeline(trained(*CASES[1]))
     rows = draw(rng, 20)
     rows[13, 4] = value
@@ -239,7 +239,7 @@ def test_features_of_another_shape(shape: tuple[int, ...]) -> None:
 
 
 @pytest.mark.parametrize("best", [0, -1, 4])
-def test_more_places_than_classes(best: int) -> None:
+def test_more_ranks_than_classes(best: int) -> None:
     predictor = PairwiseQuadratic.from_pipeline(trained(*CASES[1]))
     with pytest.raises(UsageError, match="expected 1 to 3"):
         predictor.rank(np.zeros(FEATURES), best)

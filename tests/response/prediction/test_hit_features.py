@@ -1,4 +1,4 @@
-"""Features of hits: against their twin, and what must not matter to them."""
+"""Features of hits: against their twin, and what must not change them."""
 
 import mujoco
 import numpy as np
@@ -27,7 +27,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def _hits(seed: int, hits: int = 3, frames: int = 16) -> tuple[FloatArray, FloatArray]:
-    """Poses and velocities of no particular motion, no joint turned by half a turn in the world."""
+    """Random poses and velocities; no joint is turned by half a turn in the world."""
     rng = np.random.default_rng(seed)
     poses = np.zeros((hits, frames, 59))
     poses[..., :3] = rng.normal(size=(hits, frames, 3))
@@ -38,7 +38,7 @@ def _hits(seed: int, hits: int = 3, frames: int = 16) -> tuple[FloatArray, Float
 
 @settings(max_examples=15, deadline=None)
 @given(SEEDS)
-def test_they_are_their_twins(seed: int) -> None:
+def test_equal_to_the_twin(seed: int) -> None:
     character = default_character()
     poses, velocities = _hits(seed)
     ours = extract(character, poses, velocities, FPS)
@@ -52,7 +52,7 @@ def test_they_are_their_twins(seed: int) -> None:
 def test_velocities_are_mujocos(character: Character) -> None:
     poses, velocities = _hits(3, hits=1, frames=1)
     poses[0, 0, :7] = [0.3, -0.2, 1.0, 1.0, 0.0, 0.0, 0.0]
-    told = dict(zip(FEATURE_NAMES, extract(character, poses, velocities, FPS)[0], strict=True))
+    found = dict(zip(FEATURE_NAMES, extract(character, poses, velocities, FPS)[0], strict=True))
     data = mujoco.MjData(character.model)
     data.qpos, data.qvel = poses[0, 0], velocities[0, 0]
     mujoco.mj_forward(character.model, data)
@@ -62,18 +62,18 @@ def test_velocities_are_mujocos(character: Character) -> None:
         kind, body = mujoco.mjtObj.mjOBJ_BODY, character.body(name) + 1
         mujoco.mj_objectVelocity(character.model, data, kind, body, both, 0)
         for k, axis in enumerate("xyz"):
-            assert told[f"0.0/{name}/angular_velocity_{axis}"] == pytest.approx(both[k], abs=1e-5)
-            assert told[f"0.0/{name}/velocity_{axis}"] == pytest.approx(both[3 + k], abs=1e-5)
+            assert found[f"0.0/{name}/angular_velocity_{axis}"] == pytest.approx(both[k], abs=1e-5)
+            assert found[f"0.0/{name}/velocity_{axis}"] == pytest.approx(both[3 + k], abs=1e-5)
 
 
 @settings(max_examples=15, deadline=None)
 @given(SEEDS, st.floats(-3.0, 3.0), st.floats(-9.0, 9.0))
-def test_where_it_happens_and_which_way_does_not_matter(seed: int, yaw: float, x: float) -> None:
+def test_place_and_heading_do_not_matter(seed: int, yaw: float, x: float) -> None:
     character = default_character()
     poses, velocities = _hits(seed, hits=1)
     moved = move_poses(poses[0], yaw, (x, 2.0, 0.0))[None]
     turned = velocities.copy()
-    # Of a row of qvel only the root's linear velocity is told in world axes.
+    # In a row of qvel only the root's linear velocity is in world axes.
     turned[..., :3] = rotations.rotate(rotations.from_yaw(yaw), velocities[..., :3])
     here, there = (extract(character, p, v, FPS) for p, v in ((poses, velocities), (moved, turned)))
     np.testing.assert_allclose(here, there, atol=1e-5)
@@ -104,7 +104,7 @@ def test_a_hit_alone_has_the_same_bits(character: Character) -> None:
         np.testing.assert_array_equal(alone[0], together[hit])
 
 
-def test_slices_not_reached_are_nan(character: Character) -> None:
+def test_slices_after_the_last_frame_are_nan(character: Character) -> None:
     poses, velocities = _hits(1, frames=10)
     seen = np.isfinite(extract(character, poses, velocities, FPS)).all(axis=0)
     reached = [float(name.split("/")[0]) <= 0.3 for name in FEATURE_NAMES]
@@ -121,13 +121,13 @@ def test_vectors_of_the_paper() -> None:
 
 
 @pytest.mark.parametrize("left_out", PAPER_SLICES_S)
-def test_any_slices_can_be_taken(left_out: float) -> None:
+def test_any_slices_can_be_selected(left_out: float) -> None:
     kept = [slice_s for slice_s in PAPER_SLICES_S if slice_s != left_out]
     columns = vector_columns("large", kept)
     assert {float(FEATURE_NAMES[column].split("/")[0]) for column in columns} == set(kept)
 
 
-def test_what_there_is_not_is_refused(character: Character) -> None:
+def test_unknown_vectors_and_slices_are_refused(character: Character) -> None:
     with pytest.raises(UsageError, match="large, small, got 'huge'"):
         vector_columns("huge")
     with pytest.raises(UsageError, match=r"0\.5 s, got 0\.15"):
@@ -140,8 +140,8 @@ def test_what_there_is_not_is_refused(character: Character) -> None:
         extract(character, np.zeros((2, 59)), np.zeros((2, 45)), FPS)
 
 
-def test_the_identity_changes_only_with_what_features_are() -> None:
-    """Where this fails, models and datasets made before are refused: raise `VERSION` on purpose."""
+def test_the_identity_changes_only_with_the_features() -> None:
+    """If this fails, earlier models and datasets are refused: raise `VERSION` only on purpose."""
     assert len(FEATURE_NAMES) == len(set(FEATURE_NAMES)) == 468
     assert identity() == "105c24eca2adc695"
 

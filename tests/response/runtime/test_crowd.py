@@ -45,7 +45,7 @@ def _run_until(crowd: WatchedCrowd, phase: Phase, most: int = 200) -> None:
 
 
 def _is_continuous(motion: Motion) -> None:
-    """No joint leaps and no root does: what a hit of that size does is well below."""
+    """Neither joints nor root jump: a hit of that size moves them much less."""
     quaternions = motion.poses[:, 3:].reshape(len(motion), 14, 4)
     steps = rotations.angle_between(quaternions[:-1], quaternions[1:])
     assert steps.max() * motion.fps < 35.0
@@ -53,7 +53,7 @@ def _is_continuous(motion: Motion) -> None:
 
 
 @pytest.mark.parametrize("which", range(len(HITS)))
-def test_a_hit_is_answered_as_by_the_responder(
+def test_a_hit_gives_the_response_of_the_responder(
     character: Character,
     library: ReactionLibrary,
     base: Motion,
@@ -66,7 +66,7 @@ def test_a_hit_is_answered_as_by_the_responder(
     for _ in range(len(expected.motion) - 1):
         crowd.advance()
     shown = crowd.shown()
-    # What is carried on goes on longer here than a response shows it.
+    # Without a reaction the base motion goes on longer here than in a response.
     length = min(len(shown), len(expected.motion))
     # The finished motion has its quaternions normalised once more.
     np.testing.assert_allclose(shown.poses[:length], expected.motion.poses[:length], atol=1e-12)
@@ -116,7 +116,7 @@ def test_a_second_pass_tracks_the_choice_from_the_contact_on(
     )
 
 
-def test_a_character_in_a_crowd_is_bitwise_what_it_is_alone(
+def test_a_character_has_the_same_bits_in_a_crowd_as_alone(
     character: Character, library: ReactionLibrary, base: Motion
 ) -> None:
     other = walking(character, 5.0, speed=0.8, yaw=-2.0)
@@ -146,7 +146,7 @@ def test_a_character_in_a_crowd_is_bitwise_what_it_is_alone(
 
 
 @pytest.mark.parametrize("phase", [Phase.PHYSICS, Phase.BLEND, Phase.PLAYING])
-def test_a_second_hit_takes_over_from_where_the_character_is(
+def test_a_second_hit_starts_from_the_present_pose(
     character: Character, library: ReactionLibrary, base: Motion, phase: Phase
 ) -> None:
     crowd = _crowd(character, library, base)
@@ -181,7 +181,7 @@ def test_a_second_ball_hits_a_character_in_the_blend(
 
 
 @pytest.mark.parametrize("when", ["playing", "in physics"])
-def test_after_a_miss_it_goes_back_to_what_it_did(
+def test_after_a_miss_it_goes_back_to_its_motion(
     character: Character, library: ReactionLibrary, base: Motion, when: str
 ) -> None:
     crowd = _crowd(character, library, base)
@@ -199,7 +199,7 @@ def test_after_a_miss_it_goes_back_to_what_it_did(
         np.testing.assert_allclose(responder.pose, base.poses[60], atol=1e-12)
 
 
-def test_a_light_hit_is_carried_on_through(
+def test_a_light_hit_gets_no_reaction(
     character: Character, library: ReactionLibrary, base: Motion
 ) -> None:
     crowd = _crowd(character, library, base)
@@ -223,7 +223,7 @@ def test_after_its_last_frame_a_motion_holds_and_can_be_hit(
     assert EventKind.CHOSEN in _kinds(crowd.responders[0])
 
 
-def test_what_cannot_come_is_refused(
+def test_hits_that_cannot_come_are_refused(
     character: Character, library: ReactionLibrary, base: Motion
 ) -> None:
     crowd = _crowd(character, library, base)
@@ -238,7 +238,7 @@ def test_what_cannot_come_is_refused(
     with pytest.raises(SpecError, match=r"may hit until 1\.20 s from now"):
         responder.hit(Ball(1.1))
     responder.hit(Ball(1.6))
-    # Nor while the first is in the air.
+    # Also refused while the first is in the air.
     _run_until(crowd, Phase.APPROACH)
     for another in (Push(0.0), Ball(0.25)):
         with pytest.raises(SpecError, match="may hit until"):
@@ -265,7 +265,7 @@ def test_a_chooser_made_with_other_settings_is_refused(
     WatchedCrowd(character, library, [base], config, chooser)
 
 
-def test_a_second_hit_begins_where_the_first_has_come_to(
+def test_a_second_hit_begins_with_pose_and_velocity_of_the_first(
     character: Character, library: ReactionLibrary, base: Motion
 ) -> None:
     crowd = _crowd(character, library, base)
@@ -287,7 +287,7 @@ def test_a_second_hit_begins_where_the_first_has_come_to(
     np.testing.assert_array_equal(second.setup.pose, before)
     np.testing.assert_array_equal(second.setup.velocity, first.trace.velocities[now])
     assert not second.setup.held
-    # What would go on is the choice under way, by the clock.
+    # Without the second hit the choice of the first would go on, at its own time.
     entry = first.choice.entry - (exit_frame - (first.start + now))
     entered = first.choice.motion.poses[max(entry, 0)]
     np.testing.assert_allclose(second.base.poses[0, 7:], entered[7:], atol=1e-12)
@@ -307,7 +307,7 @@ def test_a_hit_while_playing_is_held_and_begins_with_the_motions_own_velocity(
 
 @pytest.mark.parametrize("phase", [Phase.APPROACH, Phase.PHYSICS])
 @pytest.mark.parametrize("second_pass", [False, True])
-def test_a_simulation_that_blows_up_takes_nobody_down(
+def test_a_simulation_that_diverges_changes_no_other(
     character: Character,
     library: ReactionLibrary,
     base: Motion,
@@ -315,7 +315,7 @@ def test_a_simulation_that_blows_up_takes_nobody_down(
     phase: Phase,
     second_pass: bool,
 ) -> None:
-    """The state is spoilt while the hit is on its way, or before the rest is simulated."""
+    """The state is damaged during the approach, or before the rest is simulated."""
     crowd = _crowd(character, library, base, base, second_pass=second_pass)
     crowd.responders[0].hit(HARD)
     original = Simulation.approach if phase is Phase.APPROACH else Simulation.track
@@ -332,7 +332,7 @@ def test_a_simulation_that_blows_up_takes_nobody_down(
     assert crowd.responders[0].phase is Phase.PLAYING
     assert np.isfinite(crowd.shown().poses).all()
     np.testing.assert_array_equal(crowd.shown(1).poses, base.poses[:81])
-    # And the next hit is answered.
+    # The next hit gets a response.
     monkeypatch.undo()
     crowd.responders[0].hit(Ball(0.4, speed=12.0, mass=8.0))
     for _ in range(40):
@@ -351,10 +351,10 @@ def test_a_strike_by_a_second_character(
     _is_continuous(crowd.shown())
 
 
-def test_a_character_that_has_played_for_long_is_hit_as_any(
+def test_a_character_can_be_hit_after_playing_for_long(
     character: Character, library: ReactionLibrary
 ) -> None:
-    """What is past is not prepared again: here some minutes, in a game hours."""
+    """The past is not prepared again: some minutes here, hours in a game."""
     crowd = _crowd(character, library, walking(character, 1.0))
     (responder,) = crowd.responders
     for _ in range(5_000):

@@ -32,7 +32,7 @@ def _motions(seed: int, frames: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _same_poses(a: FloatArray, b: FloatArray, atol: float = 1e-9) -> None:
-    """As poses: a rotation has two signs."""
+    """Equal as poses: a rotation has two signs."""
     np.testing.assert_allclose(a[:, ROOT], b[:, ROOT], atol=atol)
     turns = rotations.angle_between(
         a[:, 3:].reshape(len(a), 14, 4), b[:, 3:].reshape(len(b), 14, 4)
@@ -58,7 +58,7 @@ class TestEase:
 
 
 class TestBlendOnto:
-    """The simulated motion brought onto the reaction."""
+    """The simulated motion blended onto the reaction."""
 
     @given(seed=seeds, frames=st.integers(2, 25))
     def test_equals_its_twin(self, seed: int, frames: int) -> None:
@@ -77,7 +77,7 @@ class TestBlendOnto:
 
     @given(seed=seeds)
     def test_between_two_still_poses_it_goes_straight(self, seed: int) -> None:
-        """Every rotation turns about one axis, ever farther from where it was."""
+        """Every rotation turns about one axis, and farther in every frame."""
         rng = np.random.default_rng(seed)
         a, b = random_poses(rng, 2)
         frames = 12
@@ -89,8 +89,8 @@ class TestBlendOnto:
         weight = np.array([blending.ease(i / (frames - 1)) for i in range(frames)])[:, None]
         np.testing.assert_allclose(done, weight * whole, atol=1e-7)
         np.testing.assert_allclose(done + left, np.tile(whole, (frames, 1)), atol=1e-7)
-        way = np.linalg.norm(blend[:, ROOT] - a[ROOT], axis=1)
-        assert np.all(np.diff(way) >= 0)
+        distance = np.linalg.norm(blend[:, ROOT] - a[ROOT], axis=1)
+        assert np.all(np.diff(distance) >= 0)
 
     @given(seed=seeds)
     def test_signs_of_quaternions_do_not_matter(self, seed: int) -> None:
@@ -104,8 +104,8 @@ class TestBlendOnto:
         poses = smooth_motion(rng, 11).poses
         _same_poses(blend_onto(poses, poses), poses, 1e-12)
 
-    def test_goes_one_way_round(self, character: Character) -> None:
-        """Two motions that turn apart by more than half a turn on the way."""
+    def test_each_rotation_keeps_its_direction(self, character: Character) -> None:
+        """Two motions whose rotations come to differ by more than half a turn."""
         frames = 21
         a = np.tile(character.rest_pose, (frames, 1))
         b = a.copy()
@@ -116,7 +116,7 @@ class TestBlendOnto:
 
 
 class TestTargets:
-    """What the servos track on the way."""
+    """Servo targets."""
 
     @given(
         seed=seeds,
@@ -141,7 +141,7 @@ class TestTargets:
         _same_poses(targets[end:], after, 1e-12)
 
     @given(seed=seeds)
-    def test_comes_ever_closer(self, seed: int) -> None:
+    def test_comes_closer_in_every_frame(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
         a, b = random_poses(rng, 2)
         targets = blended_targets(np.tile(a, (14, 1)), np.tile(b, (40, 1)), 5, 0, 10)
@@ -156,7 +156,7 @@ class TestTargets:
 
     @given(seed=seeds)
     def test_neighbouring_targets_have_neighbouring_signs(self, seed: int) -> None:
-        """The servos read between two targets on a straight line."""
+        """The servos interpolate linearly between two targets."""
         rng = np.random.default_rng(seed)
         start = random_poses(rng, 1)[0]
         a = np.tile(start, (14, 1))
@@ -166,7 +166,7 @@ class TestTargets:
         targets = blended_targets(a, b, 0, 0, 10)[:, 3:].reshape(14, 14, 4)
         assert np.sum(targets[1:] * targets[:-1], axis=-1).min() > 0.0
 
-    def test_signs_hold_where_base_and_reaction_are_half_a_turn_apart(
+    def test_signs_hold_if_base_and_reaction_differ_by_half_a_turn(
         self, character: Character
     ) -> None:
         frames = 14
@@ -179,7 +179,7 @@ class TestTargets:
 
 
 class TestPlaceOn:
-    """The reaction put where the character is."""
+    """The reaction placed on the character's pose."""
 
     @given(seed=seeds, entry=st.integers(0, 9))
     def test_entry_stands_and_faces_like_the_pose(self, seed: int, entry: int) -> None:
@@ -194,7 +194,7 @@ class TestPlaceOn:
 
     @given(seed=seeds, entry=st.integers(0, 9))
     def test_is_one_movement_on_the_ground(self, seed: int, entry: int) -> None:
-        """Heights and joints stay; all frames are turned and shifted alike."""
+        """Heights and joints stay; all frames have the same turn and shift."""
         rng = np.random.default_rng(seed)
         reaction, pose = smooth_motion(rng, 10).poses, random_poses(rng, 1)[0]
         placed = place_on(reaction, entry, pose)
@@ -232,7 +232,7 @@ class TestConfig:
         assert TransitionConfig(blend_s).blend_frames(fps) == frames
 
     @pytest.mark.parametrize("blend_s", [0.0, -1.0, math.nan, math.inf])
-    def test_refuses_what_is_no_length(self, blend_s: float) -> None:
+    def test_refuses_what_is_not_a_length(self, blend_s: float) -> None:
         with pytest.raises(UsageError, match="blend_s"):
             TransitionConfig(blend_s)
 
