@@ -15,6 +15,9 @@ import pytest
 import dynresp
 import dynresp.experiments.one_hit
 import dynresp.front_door
+import dynresp.motion.character
+import dynresp.physics.impacts
+import dynresp.response.runtime.crowd
 
 BALL = dynresp.Ball(time=1.5, mass=6, speed=8, from_deg=180)
 
@@ -78,7 +81,16 @@ def test_an_unknown_name() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", [dynresp, dynresp.front_door, dynresp.experiments.one_hit], ids=lambda m: m.__name__
+    "module",
+    [
+        dynresp,
+        dynresp.front_door,
+        dynresp.experiments.one_hit,
+        dynresp.motion.character,
+        dynresp.physics.impacts,
+        dynresp.response.runtime.crowd,
+    ],
+    ids=lambda m: m.__name__,
 )
 def test_the_examples_in_docstrings(module: object) -> None:
     result = doctest.testmod(module)  # type: ignore[arg-type]
