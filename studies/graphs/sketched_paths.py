@@ -14,7 +14,7 @@ from dynresp.avatar_runs.sketch_run import standing_at
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.sketch.path_search import SearchGraph
-from dynresp.locomotion.sketch.path_walk import SketchConfig, SketchedWalk
+from dynresp.locomotion.sketch.path_walk import SketchedWalk
 from dynresp.locomotion.sketch.sketch_control import follow_sketch
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
@@ -69,9 +69,7 @@ def follow_smooth_paths(search: SearchGraph, count: int, seed: int) -> list[Foll
     for k in range(count):
         path, stop = smooth_path(np.random.default_rng([seed, k])), k % 2 == 1
         start = standing_on(search.graph, path, _FACED_CORNER)
-        out.append(
-            Followed(path, stop, follow_sketch(search, start, path, config=SketchConfig(stop=stop)))
-        )
+        out.append(Followed(path, stop, follow_sketch(search, start, path, stop=stop)))
     return out
 
 

@@ -15,7 +15,7 @@ from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.sketch.path_search import SearchConfig
+from dynresp.locomotion.sketch import path_search
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion import rotations
 from dynresp.motion.character import Character
@@ -104,13 +104,12 @@ class Search:
         facing: FloatArray,
         spacing: float,
         target: float,
-        config: SearchConfig,
         world: World | None,
         crowded: int,
     ) -> None:
         self.graph, self.character, self.world = graph, character, world
         self.path, self.facing, self.spacing = path, facing, spacing
-        self.target, self.config, self.crowded = target, config, crowded
+        self.target, self.crowded = target, crowded
 
     def nearest(self, point: FloatArray, progress: float) -> tuple[float, float]:
         """The nearest place of the path from a progress on, not far ahead, and its distance."""
@@ -131,7 +130,7 @@ class Search:
     def objective(self, root: FloatArray, progress: float, away: float) -> float:
         """Eq. 8 with the way left as the distance."""
         last = len(self.path) - 1
-        goal = min(progress + self.config.ahead_m / self.spacing, last)
+        goal = min(progress + path_search.AHEAD_M / self.spacing, last)
         k = min(int(goal), last - 1)
         to = self.path[k] + (goal - k) * (self.path[k + 1] - self.path[k]) - root[:2]
         left = max(self.target - progress, 0.0) * self.spacing + away
@@ -152,7 +151,7 @@ class Search:
 
     def run(self, start: AvatarState, progress: float, budget: int) -> tuple[list[int], bool, int]:
         """The frames of the best way, whether it arrives, and how many ways were looked at."""
-        graph, config = self.graph, self.config
+        graph = self.graph
         database = graph.database
         playback = Playback(graph, start.frame, start.placement)
         # Frame, placement, progress, cost, playback, frames so far.
@@ -169,9 +168,9 @@ class Search:
             for k, f in enumerate(played):
                 root = placement.compose(place, database.planar[f])
                 done, away = self.nearest(root[:2], done)
-                if away > config.farthest_m:
+                if away > path_search.MAX_OFF_PATH_M:
                     return None
-                cost += config.pace / database.fps * (1.0 + config.stray * away**2)
+                cost += path_search.PACE / database.fps * (1.0 + path_search.STRAY * away**2)
                 arrived = done >= self.target - 1e-9
                 if arrived or k == len(played) - 1:
                     value = self.objective(root, done, away)
@@ -205,7 +204,7 @@ class Search:
                 found = play(node, way)
                 if found is not None:
                     cost, value = found[3], found[4]
-                    cost += config.jump * float(graph.distances[way])
+                    cost += path_search.JUMP * float(graph.distances[way])
                     heapq.heappush(heap, (cost + value, node, way))
             node, arrived = -1, False
             while heap and looked < budget:
@@ -222,7 +221,7 @@ class Search:
                 seen.add(fine)
                 crowd[rough] = crowd.get(rough, 0) + 1
                 node = len(states)
-                cost += config.jump * float(graph.distances[way])
+                cost += path_search.JUMP * float(graph.distances[way])
                 states.append((played[-1], place, done, cost, playback, so_far + played))
                 if value < least:
                     least, best = value, node
@@ -241,6 +240,6 @@ class Search:
         for pose in playback.play(played).poses:
             yaw = float(rotations.yaw_of(pose[3:7]))
             reach = footprint(self.character, pose)
-            if collides(self.world, pose[0], pose[1], yaw, reach, self.config.margin_m):
+            if collides(self.world, pose[0], pose[1], yaw, reach, path_search.MARGIN_M):
                 return False
         return True

@@ -12,6 +12,7 @@ time at a pace, more of it the farther the avatar strays, and the distance of ea
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -25,77 +26,46 @@ from dynresp.locomotion.worlds.footprints import body_arrays, footprints
 from dynresp.locomotion.worlds.paths import window_m
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.arrays import IntArray
-from dynresp.support.checks import check_numbers
-from dynresp.support.errors import UsageError
+from dynresp.support.arrays import IntArray, frozen
 
-FARTHEST_AHEAD_M = 100.0
-"""How far ahead on a path the point may be that the avatar should face [m]."""
+if TYPE_CHECKING:
+    from dynresp.locomotion.sketch.path_search_kernel import SearchResult
 
-
-@dataclass(frozen=True)
-class SearchConfig:
-    """What a good way is, and how long one is looked for.
-
-    Attributes:
-        facing: c of eq. 8, at least 0 and below 1.
-        ahead_m: How far ahead on the path the point is that the avatar should face, at most
-            `FARTHEST_AHEAD_M` [m].
-        pace: What a second costs [m]. Well below the speed of walking the search is greedy; at
-            that speed and above it looks at all there is.
-        stray: At a distance d from the path a second costs 1 + stray d^2 times as much [1/m^2].
-        jump: What a jump costs for each unit of its distance (eq. 2) [m].
-        farthest_m: Ways that lead farther from the path than this are dropped [m].
-        margin_m: By how much footprints are widened [m]. They are those of the poses as played;
-            the margin must hold what lies between two frames, and the fitting of the feet.
-
-    Raises:
-        UsageError: A number makes no sense.
-    """
-
-    facing: float = 0.2
-    ahead_m: float = 0.6
-    pace: float = 0.5
-    stray: float = 15.0
-    jump: float = 4.0
-    farthest_m: float = 1.2
-    margin_m: float = 0.03
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        check_numbers(self)
-        if not 0 <= self.facing < 1:
-            raise UsageError(
-                f"facing must be at least 0 and below 1, got {self.facing}: from 1 on it would pay "
-                "to be far from the goal"
-            )
-        for name in ("ahead_m", "pace", "stray", "jump", "margin_m"):
-            if not getattr(self, name) >= 0:
-                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
-        if self.ahead_m > FARTHEST_AHEAD_M:
-            raise UsageError(
-                f"ahead_m must be at most {FARTHEST_AHEAD_M:g}, got {self.ahead_m}: nobody faces "
-                "what is farther ahead"
-            )
-        if not self.farthest_m > 0:
-            raise UsageError(f"farthest_m must be above 0, got {self.farthest_m}")
+FACING = 0.2
+"""c of eq. 8, at least 0 and below 1: from 1 on it would pay to be far from the goal."""
+AHEAD_M = 0.6
+"""Distance along the path to the point that the avatar should face [m]."""
+PACE = 0.5
+"""Cost of a second [m]. Well below the speed of walking the search is greedy; at that speed and
+above it looks at everything."""
+STRAY = 15.0
+"""At a distance d from the path a second costs 1 + STRAY d^2 times as much [1/m^2]."""
+JUMP = 4.0
+"""Cost of a jump per unit of its distance (eq. 2) [m]."""
+MAX_OFF_PATH_M = 1.2
+"""Edges that lead farther from the path than this are dropped [m]."""
+MARGIN_M = 0.03
+"""Footprints are widened by this [m]. They are those of the poses as played; the margin must cover
+what happens between two frames, and the foot fitting."""
+# Standing: no faster than this [m/s, rad/s], for this long [s].
+_STANDING_SPEED, _STANDING_TURN, _STANDING_S = 0.15, 0.5, 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A way that a search has found.
+class FoundPath:
+    """A path through the graph that a search has found.
 
     Attributes:
         frames: (k,) played after the state it began from.
         placements: (k, 4) of their clips.
-        joints: (j,) ascending indices into frames, the last frame of each of its ways.
-        progress: (j,) how much of the path is done there [points].
+        joints: (j,) ascending indices into frames, the last frame after each of its edges.
+        progress: (j,) progress along the drawn path there [points].
         displacements: (j, 91) what is left of blends there; see `AvatarState`. Zeros where there
             are no boxes.
-        arrived: Whether its last frame is where the search was to end; otherwise it comes as near
-            as any that was looked at.
-        looked: Ways that were taken from the heap.
-        collided: Ways among them that were dropped for a collision.
+        arrived: Whether its last frame is at the end of the search; otherwise it comes as near as
+            any that was looked at.
+        looked: Edges that were taken from the heap.
+        collided: Those among them that were dropped for a collision.
     """
 
     frames: IntArray
@@ -109,39 +79,39 @@ class Found:
 
 
 class SearchGraph:
-    """A motion graph laid out for the search. Made once, it serves any number of them.
+    """A motion graph prepared for searches. One object serves any number of them.
 
     Attributes:
         graph: The graph.
         character: Whose it is.
         footprints: (n, 4) float32, of each frame; see `dynresp.locomotion.worlds.footprints`.
-        half_width_m: Half of how much ground it mostly covers sideways [m].
-        reach_m: Farthest that any of them reaches from its root [m].
-        ends: (n,) the first frame from each on, itself included, from which other ways lead than
+        half_width_m: Half of the median width of the footprints [m].
+        reach_m: Farthest that any footprint reaches from its root [m].
+        ends: (n,) the first frame from each on, itself included, from which other edges lead than
             the recorded one; -1 outside of the graph's component.
         still: (n,) where the avatar stands, and goes on standing for half a second.
     """
 
     def __init__(self, graph: MotionGraph, character: Character | None = None) -> None:
-        """Lay out a graph.
+        """Prepare a graph.
 
         Args:
             graph: The graph.
-            character: Whose it is, by default the product's own.
+            character: Whose motions it holds, by default the product's own.
         """
         database = graph.database
         self.graph = graph
         self.character = character or default_character()
         feet = footprints(self.character, database.poses)
-        self.footprints = feet.astype(np.float32)
+        self.footprints = frozen(feet.astype(np.float32))
         corners = np.hypot(np.abs(feet[:, :2]).max(axis=1), np.abs(feet[:, 2:]).max(axis=1))
         self.half_width_m = 0.5 * float(np.median(feet[:, 3] - feet[:, 2]))
         self.reach_m = float(corners.max())
-        self.ends = _ends(graph)
-        self.still = _still(graph)
-        self._planar = np.ascontiguousarray(database.planar[:, [0, 1, 3]])
+        self.ends = frozen(_ends(graph))
+        self.still = frozen(_still(graph))
+        self._planar = frozen(np.ascontiguousarray(database.planar[:, [0, 1, 3]]))
         self._body = body_arrays(self.character)
-        self._anywhere = np.ones(len(database), dtype=bool)
+        self._anywhere = frozen(np.ones(len(database), dtype=bool))
 
     def search(
         self,
@@ -151,29 +121,29 @@ class SearchGraph:
         spacing: float,
         progress: float,
         target: float,
-        config: SearchConfig,
         budget: int,
         crowded: int,
         grid: CollisionGrid | None = None,
         arrival_m: float | None = None,
         stop: bool = False,
-    ) -> Found:
-        """Find the best way along a path.
+        greed: float = 1.0,
+    ) -> FoundPath:
+        """Find the best path through the graph along a drawn path.
 
         Args:
-            start: Where it begins.
+            start: Where it starts.
             path: (p, 2) points `spacing` apart, at least two [m].
             facing: (p,) c of eq. 8 along it, at least 0 and below 1.
             spacing: Their distance along the path [m].
-            progress: How much of the path is done [points].
-            target: How much of it is to be done [points].
-            config: What a good way is.
-            budget: Most ways to take from the heap.
-            crowded: Most states to look at in one neighbourhood: a quarter of a metre, 30 degrees.
+            progress: Progress along the drawn path at the start [points].
+            target: Progress at which the search may end [points].
+            budget: Most edges to take from the heap.
+            crowded: Most states to look at in one neighbourhood: 0.25 m, 30 degrees.
             grid: The world's boxes.
             arrival_m: How near to the path's last point it must end [m]; None where it may pass
                 the target at any distance.
             stop: Whether it must end standing.
+            greed: Divides the cost of time; its square divides that of jumps.
 
         Raises:
             UsageError: The start is not in the graph's component.
@@ -182,64 +152,64 @@ class SearchGraph:
         from dynresp.locomotion.sketch import path_search_kernel as kernel
 
         check_in_component(self.graph, start.frame)
-        settings = np.zeros(kernel.SETTINGS)
-        settings[kernel.PACE], settings[kernel.STRAY] = config.pace, config.stray
-        settings[kernel.JUMP] = config.jump
-        settings[kernel.AHEAD], settings[kernel.FARTHEST] = config.ahead_m, config.farthest_m
-        settings[kernel.MARGIN], settings[kernel.SPACING] = config.margin_m, spacing
-        settings[kernel.FRAME_TIME] = 1.0 / self.graph.database.fps
-        settings[kernel.TARGET] = target
-        settings[kernel.REACHED] = target - (arrival_m or 0.0) / spacing - 1e-9
-        settings[kernel.RADIUS] = np.inf if arrival_m is None else arrival_m
-        settings[kernel.WINDOW] = np.ceil(window_m(self.graph.database.fps) / spacing)
-        settings[kernel.BLEND] = self.graph.config.blend_s
-        settings[kernel.BLEND_RATE] = self.graph.config.blend_rate_s
+        fps, config, database = self.graph.database.fps, self.graph.config, self.graph.database
+        settings = kernel.SearchSettings(
+            pace=PACE / greed,
+            stray=STRAY,
+            jump=JUMP / greed**2,
+            ahead_m=AHEAD_M,
+            max_off_path_m=MAX_OFF_PATH_M,
+            margin_m=MARGIN_M,
+            spacing_m=float(spacing),
+            frame_s=1.0 / fps,
+            blend_s=float(config.blend_s),
+            blend_rate_s=float(config.blend_rate_s),
+            target=float(target),
+            arrival=float(target - (arrival_m or 0.0) / spacing - 1e-9),
+            arrival_m=np.inf if arrival_m is None else float(arrival_m),
+            window=float(np.ceil(window_m(fps) / spacing)),
+            budget=int(budget),
+            crowded=int(crowded),
+        )
+        graph = kernel.SearchArrays(
+            self.graph.offsets, self.graph.targets, self.graph.distances, self.graph.placements,
+            self._planar, self.ends, self.still if stop else self._anywhere, self.footprints,
+            database.poses, database.velocities,
+        )  # fmt: skip
         begin = np.array([*start.placement[[0, 1, 3]], progress, 0.0])
         playing = np.zeros(kernel.PLAYED)
         playing[: kernel.OFFSET] = start.placement
-        playing[kernel.AGE] = self.graph.config.blend_s
+        playing[kernel.AGE] = config.blend_s
         if start.displacement is not None:
             playing[kernel.OFFSET :] = start.displacement
-        told = np.empty(3, dtype=np.int64)
-        database = self.graph.database
-        chain, done, rows = kernel.search_kernel(
-            start.frame, begin, playing, settings, path, facing, budget, crowded,
-            self.graph.offsets, self.graph.targets, self.graph.distances, self.graph.placements,
-            self._planar, self.ends, self.still if stop else self._anywhere, self.footprints,
-            (database.poses, database.velocities), self._body, (grid or _NOTHING).arrays, told,
+        found = kernel.search_kernel(
+            start.frame, begin, playing, settings, graph, path, facing, self._body,
+            (grid or _NOTHING).arrays,
         )  # fmt: skip
-        return self._found(start, chain, done, rows[:, kernel.OFFSET :], told)
+        return self._played(start.placement, found, found.played[:, kernel.OFFSET :])
 
-    def _found(
-        self,
-        start: AvatarState,
-        chain: npt.NDArray[np.int64],
-        done: FloatArray,
-        displacements: FloatArray,
-        told: npt.NDArray[np.int64],
-    ) -> Found:
-        """Play a chain of ways."""
+    def _played(self, at: FloatArray, result: SearchResult, displacements: FloatArray) -> FoundPath:
+        """Play the edges of a search from a placement (4,)."""
         frames, placements, lengths = [], [], []
-        at = start.placement
-        for index, way in enumerate(chain):
-            at = placement.compose(at, self.graph.placements[way])
-            entry = self.graph.targets[way]
+        for index, edge in enumerate(result.edges):
+            at = placement.compose(at, self.graph.placements[edge])
+            entry = self.graph.targets[edge]
             last = self.ends[entry]
-            if index == len(chain) - 1 and told[0] >= 0:
-                last = told[0]
+            if index == len(result.edges) - 1 and result.arrival >= 0:
+                last = result.arrival
             played = np.arange(entry, last + 1, dtype=np.int32)
             frames.append(played)
             placements.append(np.broadcast_to(at, (len(played), 4)))
             lengths.append(len(played))
-        return Found(
+        return FoundPath(
             np.concatenate([np.zeros(0, dtype=np.int32), *frames]),
             np.concatenate([np.zeros((0, 4)), *placements]),
             np.cumsum(lengths, dtype=np.intp) - 1,
-            done,
+            result.progress,
             displacements,
-            bool(told[0] >= 0),
-            int(told[1]),
-            int(told[2]),
+            bool(result.arrival >= 0),
+            int(result.looked),
+            int(result.collided),
         )
 
 
@@ -277,7 +247,3 @@ def _still(graph: MotionGraph) -> npt.NDArray[np.bool_]:
         still[:-ahead] &= stands[ahead:] & (database.clip_of[ahead:] == database.clip_of[:-ahead])
         still[-ahead:] = False
     return still
-
-
-# Standing: no faster than this [m/s, rad/s], for this long [s].
-_STANDING_SPEED, _STANDING_TURN, _STANDING_S = 0.15, 0.5, 0.5

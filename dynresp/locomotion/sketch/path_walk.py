@@ -1,40 +1,45 @@
-"""A walk along a path in the making: stretch by stretch, taken back where it leads nowhere."""
+"""Follow a path piece by piece: search ahead, play a part, go back where nothing leads on."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from dynresp.locomotion.graph import placement
 from dynresp.locomotion.graph.random_walk import check_in_component
 from dynresp.locomotion.playing.avatar_state import AvatarState
-from dynresp.locomotion.sketch.path_search import Found, SearchConfig, SearchGraph
+from dynresp.locomotion.sketch.path_search import FACING, MARGIN_M, FoundPath, SearchGraph
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.paths import distances_to, resampled
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import IntArray
-from dynresp.support.checks import check_numbers
-from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.errors import DynrespError
 from dynresp.support.progress import Progress
 
 SPACING = 0.1
-"""Distance of the points of the path that is walked along [m]."""
-MOST_LOOKED = 10_000_000
-"""The most ways that one search may look at: as many places are remembered, in about 1 GB."""
-# The most states that are looked at in one neighbourhood.
+"""Distance of the points of the path that is followed [m]."""
+HORIZON_M = 2.5
+"""How far ahead along the path each search looks [m]."""
+COMMIT_S = 1.0
+"""How much of a result is played before the next search [s]."""
+BUDGET = 4000
+"""Most edges that a search looks at; up to 160 times as many where it finds nothing."""
+ARRIVAL_M = 0.25
+"""How near to the end of the path the avatar must come [m]; for a path shorter than twice this,
+within half of its length."""
+# Most states that are looked at in one neighbourhood.
 _CROWDED = 12
-# How many times the budget is spent on coming near to where no way leads.
+# Factor of the budget for coming near to an end that cannot be reached.
 _MORE = 16
-# Where nothing is found the search begins anew: how far back [s], with how many times the budget,
-# with costs counted how many times less, and with how many states in a neighbourhood. What has a
-# way at all is found soonest by looking first at what is nearest to the goal, whatever it has cost;
-# that is also how narrow passages are found, before which there is a lot to try that costs less
-# than turning sideways.
-_AGAIN = (
+# Where a search finds nothing, others follow: how far back they start [s], the factor of the
+# budget, the divisor of the costs, and the most states in a neighbourhood. If there is a path at
+# all, it is found soonest by looking first at what is nearest to the goal, whatever it costs. So
+# narrow passages are found, too: much that costs less than turning sideways can be tried first.
+_RETRIES = (
     (0.0, 16, 1.0, 12),
     (0.0, 16, 3.0, 12),
     (2.0, 16, 10.0, 40),
@@ -43,54 +48,12 @@ _AGAIN = (
     (4.0, 160, 10.0, 120),
     (8.0, 160, 30.0, 120),
 )
-# A place where that did not help either is closed with a disc of this radius [m], at most so often.
-_CLOSED_M, _MOST_CLOSED = 0.3, 4
-# How far from a narrow place it does not count where the avatar faces [m].
+# If that fails as well, a disc of this radius closes the place [m], at most so often.
+_CLOSED_M, _MAX_CLOSED = 0.3, 4
+# Within this distance of a narrow place the facing of the avatar does not count [m].
 _NARROW_M = 0.8
-# Poses reach farther from their root by at most this when blended [m].
+# Blending adds at most this to how far a pose reaches from its root [m].
 _BLENDED_REACH_M = 0.5
-
-
-@dataclass(frozen=True)
-class SketchConfig:
-    """How a sketch is followed.
-
-    Attributes:
-        search: What a good way is.
-        horizon_m: How far ahead along the path a way is looked for [m].
-        commit_s: How much of it is played before the next one is looked for [s].
-        budget: Most ways that are looked at each time, at most `MOST_LOOKED`; where none is found,
-            up to 160 times as many, but no more than that either.
-        arrival_m: How near to its end the avatar must come [m]; to that of a path shorter than
-            twice this, within half of its length.
-        stop: Whether it must stand there; otherwise it may be walking.
-
-    Raises:
-        UsageError: A number makes no sense.
-    """
-
-    search: SearchConfig = field(default_factory=SearchConfig)
-    horizon_m: float = 2.5
-    commit_s: float = 1.0
-    budget: int = 4000
-    arrival_m: float = 0.25
-    stop: bool = False
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        check_numbers(self)
-        for name, kind in (("search", SearchConfig), ("stop", bool)):
-            if not isinstance(getattr(self, name), kind):
-                given = type(getattr(self, name)).__name__
-                raise UsageError(f"{name} must be a {kind.__name__}, got {given}")
-        for name in ("horizon_m", "commit_s", "budget", "arrival_m"):
-            if not getattr(self, name) > 0:
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
-        if self.budget > MOST_LOOKED:
-            raise UsageError(
-                f"budget must be at most {MOST_LOOKED} ways, got {str(self.budget)[:40]}: room for "
-                "all of them is made before the search begins"
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +61,17 @@ class SketchedWalk:
     """A walk along a sketch.
 
     Attributes:
-        frames: (k,) the walk, beginning with the frame of the start.
+        frames: (k,) the walk; the first is the frame of the start.
         placements: (k, 4) of their clips.
         roots: (k, 4) x, y, z [m] and yaw [rad] of the root.
-        path: (p, 2) what was walked along: the sketch, bent around obstacles [m].
+        path: (p, 2) the path that was followed: the sketch, bent around obstacles [m].
         off_path: (k,) distance of the root to it [m].
         arrived: Whether the end was reached.
-        looked: Ways that the searches have looked at.
+        looked: Edges that the searches looked at.
         collided: Those dropped for a collision.
-        backtracks: How often a stretch was taken back because it led nowhere.
-        detours: How often a place was closed because there is no getting through.
-        planning_s: Time that the planning took [s].
+        backtracks: How often a part was taken back because nothing led on.
+        detours: How often a place was closed because no search got through.
+        planning_s: Time that the searches took [s].
     """
 
     frames: IntArray
@@ -126,12 +89,12 @@ class SketchedWalk:
 
 @dataclass(frozen=True, eq=False)
 class _Joint:
-    """A place in a walk from which it may be planned anew.
+    """A point of a walk from which a search may start again.
 
     Attributes:
         state: Where the avatar is.
-        progress: How much of the path is done [points].
-        played: How many frames of the walk.
+        progress: Progress along the path [points].
+        played: Frames of the walk so far.
     """
 
     state: AvatarState
@@ -140,11 +103,10 @@ class _Joint:
 
 
 class Follower:
-    """A walk in the making.
+    """Makes one walk along a path.
 
     Attributes:
-        config: How the path is followed.
-        begin: (2,) where the walk begins [m].
+        begin: (2,) where the walk starts [m].
     """
 
     def __init__(
@@ -152,25 +114,25 @@ class Follower:
         graph: SearchGraph,
         start: AvatarState,
         world: World | None,
-        config: SketchConfig | None,
+        stop: bool,
         progress: Progress | None,
     ) -> None:
         """Prepare to walk.
 
         Args:
-            graph: Where the avatar walks through.
-            start: Where it is.
+            graph: The graph to walk through.
+            start: Where the avatar is.
             world: Obstacles; None for open ground.
-            config: How the path is followed.
-            progress: Told how far it is.
+            stop: Whether the walk must end standing; otherwise the avatar may be walking there.
+            progress: Called with the state of the work.
 
         Raises:
             UsageError: The start is not in the graph's component.
         """
         check_in_component(graph.graph, start.frame)
         self.graph, self.start, self.world = graph, start, world
-        self.config = config or SketchConfig()
-        self.tell = progress or _tell_nobody
+        self.stop = stop
+        self.report = progress or _report_nothing
         self.begin = start.root(graph.graph)[:2]
         self.fps = graph.graph.database.fps
         self.grid: CollisionGrid | None = None
@@ -191,11 +153,11 @@ class Follower:
         began = time.perf_counter()
         closed = np.zeros((0, 3))
         if self.world is not None:
-            self.tell("looking for a path between the obstacles", 0, 1)
+            self.report("looking for a path between the obstacles", 0, 1)
         path = _long_enough(path_from(closed))
         arrived, stuck = self._along(path)
-        while not arrived and self.world is not None and len(closed) < _MOST_CLOSED:
-            ahead = path[int(stuck) : int(stuck + self.config.horizon_m / SPACING) + 1]
+        while not arrived and self.world is not None and len(closed) < _MAX_CLOSED:
+            ahead = path[int(stuck) : int(stuck + HORIZON_M / SPACING) + 1]
             narrowest = ahead[np.argmin(self.world.distances(ahead))]
             closed = np.concatenate([closed, [[*narrowest, _CLOSED_M]]])
             try:
@@ -228,13 +190,13 @@ class Follower:
         self.frames = np.array([self.start.frame], dtype=np.int32)
         self.placements = self.start.placement[None]
         self.joints = [_Joint(self.start, 0.0, 1)]
-        commit = round(self.config.commit_s * self.fps)
+        commit = round(COMMIT_S * self.fps)
         while True:
             at = self.joints[-1]
-            self.tell("looking for a way", int(at.progress), int(self.end))
-            target = min(at.progress + self.config.horizon_m / SPACING, self.end)
+            self.report("looking for a path through the graph", int(at.progress), int(self.end))
+            target = min(at.progress + HORIZON_M / SPACING, self.end)
             if not (
-                self._advance(at, target, commit, self.config.budget, self.config.search, _CROWDED)
+                self._advance(at, target, commit, BUDGET, 1.0, _CROWDED)
                 or self._advance_from_farther_back(target)
             ):
                 return False, at.progress
@@ -242,10 +204,10 @@ class Follower:
                 return True, self.end
 
     def _facing(self, path: FloatArray) -> FloatArray:
-        """How facing counts along a path: not at all near places that are narrow for a body."""
-        facing = np.full(len(path), self.config.search.facing)
+        """Weight of facing along a path: 0 near places that are narrow for a body."""
+        facing = np.full(len(path), FACING)
         if self.grid is not None:
-            wide = self.graph.half_width_m + 2.0 * self.config.search.margin_m
+            wide = self.graph.half_width_m + 2.0 * MARGIN_M
             narrow = self.grid.distances(path) < wide
             around = round(_NARROW_M / SPACING)
             near = np.convolve(narrow, np.ones(2 * around + 1))[around : around + len(path)]
@@ -253,23 +215,21 @@ class Follower:
         return facing
 
     def _come_near(self) -> None:
-        """Go as far as there is a way, where none leads on."""
+        """Go as near to the end as possible, where it cannot be reached."""
         at = self.joints[-1]
-        target = min(at.progress + self.config.horizon_m / SPACING, self.end)
-        budget = _MORE * self.config.budget
-        self._play(at, self._search(at, target, budget, self.config.search, _CROWDED), None)
+        target = min(at.progress + HORIZON_M / SPACING, self.end)
+        budget = _MORE * BUDGET
+        self._play(at, self._search(at, target, budget, 1.0, _CROWDED), None)
 
     def _advance_from_farther_back(self, target: float) -> bool:
-        """Look for a way to where none was found, longer and from earlier joints."""
+        """Search again with more budget and from earlier joints."""
         latest = self.joints[-1].played
-        costs = self.config.search
-        for tried, (back_s, more, greed, crowded) in enumerate(_AGAIN):
+        for tried, (back_s, more, greed, crowded) in enumerate(_RETRIES):
             if more > _MORE:
-                self.tell("there is none at hand, looking farther", tried, len(_AGAIN))
+                self.report("found none nearby, looking farther", tried, len(_RETRIES))
             earlier = [j for j in self.joints if j.played <= latest - back_s * self.fps]
             joint = earlier[-1] if earlier else self.joints[0]
-            greedy = replace(costs, pace=costs.pace / greed, jump=costs.jump / greed**2)
-            if self._advance(joint, target, None, more * self.config.budget, greedy, crowded):
+            if self._advance(joint, target, None, more * BUDGET, greed, crowded):
                 self.backtracks += 1
                 return True
         return False
@@ -280,51 +240,50 @@ class Follower:
         target: float,
         commit: int | None,
         budget: int,
-        search: SearchConfig,
+        greed: float,
         crowded: int,
     ) -> bool:
-        """Go on from a joint to a target; what was walked after the joint is taken back.
+        """Search from a joint to a target, and replace what was played after the joint.
 
         Args:
             at: The joint.
-            target: How much of the path is to be done [points].
-            commit: After how many frames the first ways of it suffice; None where all are to be
-                played.
-            budget: Most ways to look at.
-            search: What a good way is.
+            target: Progress along the path to reach [points].
+            commit: Play the first edges of the result, up to so many frames; None to play all.
+            budget: Most edges to look at.
+            greed: See `SearchGraph.search`.
             crowded: Most states in one neighbourhood.
 
         Returns:
-            Whether there is such a way. If there is none, nothing is changed.
+            Whether the search got there. If not, nothing changes.
         """
-        found = self._search(at, target, budget, search, crowded)
+        found = self._search(at, target, budget, greed, crowded)
         if found.arrived:
             self._play(at, found, commit if target < self.end else None)
             self.arrived = target == self.end
         return found.arrived
 
     def _search(
-        self, at: _Joint, target: float, budget: int, search: SearchConfig, crowded: int
-    ) -> Found:
+        self, at: _Joint, target: float, budget: int, greed: float, crowded: int
+    ) -> FoundPath:
         last = target == self.end
-        arrival_m = min(self.config.arrival_m, 0.5 * self.end * SPACING)
+        arrival_m = min(ARRIVAL_M, 0.5 * self.end * SPACING)
         found = self.graph.search(
-            at.state, self.path, self.facing, SPACING, at.progress, target, search,
-            min(budget, MOST_LOOKED), crowded, self.grid, arrival_m if last else None,
-            last and self.config.stop,
+            at.state, self.path, self.facing, SPACING, at.progress, target,
+            budget, crowded, self.grid, arrival_m if last else None,
+            last and self.stop, greed,
         )  # fmt: skip
         self.looked += found.looked
         self.collided += found.collided
         return found
 
-    def _play(self, at: _Joint, found: Found, commit: int | None) -> None:
-        """Play the first ways of what was found at a joint; what was walked after it is gone."""
-        ways = len(found.joints)
+    def _play(self, at: _Joint, found: FoundPath, commit: int | None) -> None:
+        """Play the first edges of a result from a joint; what was played after it is removed."""
+        edges = len(found.joints)
         if commit is not None:
-            ways = 1 + int(np.searchsorted(found.joints[:-1] + 1, commit))
+            edges = 1 + int(np.searchsorted(found.joints[:-1] + 1, commit))
         del self.joints[self.joints.index(at) + 1 :]
         for joint, progress, left in zip(
-            found.joints[:ways], found.progress, found.displacements, strict=False
+            found.joints[:edges], found.progress, found.displacements, strict=False
         ):
             state = AvatarState(int(found.frames[joint]), found.placements[joint], left)
             self.joints.append(_Joint(state, float(progress), at.played + int(joint) + 1))
@@ -333,8 +292,8 @@ class Follower:
         self.placements = np.concatenate([self.placements[: at.played], found.placements[:stop]])
 
 
-def _tell_nobody(stage: str, done: int, of: int) -> None:
-    """Where nobody asked for progress."""
+def _report_nothing(stage: str, done: int, of: int) -> None:
+    """Used where no progress is wanted."""
 
 
 def _long_enough(path: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Control by sketch: the avatar walks along a path drawn on the ground (Lee et al. 2002, 5.2)."""
+"""Walk along a drawn path, or to a point: control by sketch (Lee et al. 2002, section 5.2)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.sketch.path_search import SearchGraph
-from dynresp.locomotion.sketch.path_walk import SPACING, Follower, SketchConfig, SketchedWalk
+from dynresp.locomotion.sketch.path_walk import SPACING, Follower, SketchedWalk
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.path_planning import fit_path, plan_path
 from dynresp.locomotion.worlds.paths import as_path, as_point, check_length, resampled
@@ -21,31 +21,31 @@ def follow_sketch(
     start: AvatarState,
     sketch: npt.ArrayLike,
     world: World | None = None,
-    config: SketchConfig | None = None,
+    stop: bool = False,
     progress: Progress | None = None,
 ) -> SketchedWalk:
-    """Walk along a sketch, by incremental best-first search: the paper's second way.
+    """Walk along a sketch by incremental best-first search: the paper's second method.
 
-    The search looks for a way to `horizon_m` ahead, of which the first `commit_s` are played; from
-    there it goes on. In a world the sketch is first bent to keep clear of obstacles, and ways that
-    touch one are dropped. Where no way is left, the search begins anew farther back; where that
-    does not help, the place is closed and the path planned around it.
+    Each search looks 2.5 m ahead (`HORIZON_M`), and the first second of its result is played
+    (`COMMIT_S`). In a world the sketch is first bent to keep clear of obstacles, and edges that
+    touch one are dropped. Where a search finds nothing, others start farther back; if they fail as
+    well, the place is closed and the path is planned around it.
 
     Args:
-        graph: Where the avatar walks through.
-        start: Where it is. Its path begins there even if the sketch does not.
-        sketch: (k, 2) corners of a path on the ground, at most 1 km with the way there [m].
+        graph: The graph to walk through.
+        start: Where the avatar is. Its path starts there even if the sketch does not.
+        sketch: (k, 2) corners of a path on the ground, at most 1 km, from the avatar on [m].
         world: Obstacles; None for open ground.
-        config: How it is followed.
-        progress: Told how far it is.
+        stop: Whether the walk must end standing; otherwise the avatar may be walking there.
+        progress: Called with the state of the work.
 
     Raises:
-        UsageError: The sketch is none or too long, or the start is not in the graph's component.
-        DynrespError: There is no way between the obstacles.
+        UsageError: The sketch is no path or too long, or the start is not in the graph's component.
+        DynrespError: There is no path between the obstacles.
     """
-    _check_kinds(graph, start, world, config)
-    follower = Follower(graph, start, world, config, progress)
-    config, root = follower.config, follower.begin
+    _check_kinds(graph, start, world, stop)
+    follower = Follower(graph, start, world, stop, progress)
+    root = follower.begin
     corners = as_path(sketch, "a sketch")
     if np.hypot(*(corners[0] - root)) > 2.0 * SPACING:
         corners = np.concatenate([root[None], corners])
@@ -65,28 +65,29 @@ def reach(
     start: AvatarState,
     goal: npt.ArrayLike,
     world: World | None = None,
-    config: SketchConfig | None = None,
+    stop: bool = False,
     progress: Progress | None = None,
 ) -> SketchedWalk:
-    """Walk to a place: a planned path serves as the sketch.
+    """Walk to a point on the ground; a planned path serves as the sketch.
 
     Args:
-        graph: Where the avatar walks through.
-        start: Where it is.
-        goal: (2,) the place, at most 1 km away [m].
+        graph: The graph to walk through.
+        start: Where the avatar is.
+        goal: (2,) x and y of the point, at most 1 km away [m].
         world: Obstacles; None for open ground.
-        config: How the path is followed.
-        progress: Told how far it is.
+        stop: Whether the walk must end standing; otherwise the avatar may be walking there.
+        progress: Called with the state of the work.
 
     Raises:
-        UsageError: The goal is none or too far away, or the start is not in the graph's component.
-        DynrespError: There is no way between the obstacles.
+        UsageError: The goal is no point or too far away, or the start is not in the graph's
+            component.
+        DynrespError: There is no path between the obstacles.
     """
-    _check_kinds(graph, start, world, config)
-    follower = Follower(graph, start, world, config, progress)
-    config, root = follower.config, follower.begin
+    _check_kinds(graph, start, world, stop)
+    follower = Follower(graph, start, world, stop, progress)
+    root = follower.begin
     end = as_point(goal, "a goal")
-    check_length(np.stack([root, end]), "the straight way to the goal")
+    check_length(np.stack([root, end]), "the straight line to the goal")
 
     def path_from(closed: FloatArray) -> FloatArray:
         if world is None:
@@ -96,13 +97,11 @@ def reach(
     return follower.walk(path_from)
 
 
-def _check_kinds(
-    graph: SearchGraph, start: AvatarState, world: World | None, config: SketchConfig | None
-) -> None:
-    """Refuse what is something else.
+def _check_kinds(graph: SearchGraph, start: AvatarState, world: World | None, stop: bool) -> None:
+    """Check the types of the arguments.
 
     Raises:
-        UsageError: Something is; the message says how the right one is made.
+        UsageError: One has a wrong type; the message says how to make the right one.
     """
     expected = (
         (graph, SearchGraph, "the graph", "a SearchGraph, made by SearchGraph(graph)"),
@@ -113,7 +112,7 @@ def _check_kinds(
             "an AvatarState, made by AvatarState.at(...)",
         ),
         (world, World | None, "the world", "a World of boxes, or None"),
-        (config, SketchConfig | None, "the configuration", "a SketchConfig, or None"),
+        (stop, bool, "stop", "True or False"),
     )
     for given, kind, what, right in expected:
         if not isinstance(given, kind):

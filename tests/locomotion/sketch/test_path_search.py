@@ -5,7 +5,8 @@ from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
-from dynresp.locomotion.sketch.path_search import Found, SearchConfig, SearchGraph
+from dynresp.locomotion.sketch import path_search
+from dynresp.locomotion.sketch.path_search import FoundPath, SearchGraph
 from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
 from dynresp.locomotion.worlds.paths import resampled
@@ -35,18 +36,17 @@ def search(
     budget: int = 400,
     crowded: int = 12,
     world: World | None = None,
-    config: SearchConfig | None = None,
-) -> Found:
+) -> FoundPath:
     grid = None if world is None else CollisionGrid.of(world, tables.reach_m + 0.5)
     facing = np.full(len(path), 0.2)
-    return tables.search(
-        start, path, facing, SPACING, 0.0, target, config or SearchConfig(), budget, crowded, grid
-    )
+    return tables.search(start, path, facing, SPACING, 0.0, target, budget, crowded, grid)
 
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("boxes", [False, True])
-def test_it_equals_its_slow_twin(seed: int, boxes: bool, character: Character) -> None:
+def test_it_equals_its_slow_twin(
+    seed: int, boxes: bool, character: Character, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng([seed, 5])
     graph = made_graph(seed)
     tables = SearchGraph(graph, character)
@@ -61,28 +61,30 @@ def test_it_equals_its_slow_twin(seed: int, boxes: bool, character: Character) -
             for a, b in zip(turns, turns[::-1], strict=True)
         ]
         world = World((-3.0, -3.0, 3.0, 3.0), tuple(blocks))
-    config = SearchConfig(stray=3.0, jump=0.3)
-    found = search(tables, start, path, target, 150, 3, world, config)
-    twin = oracle.Search(
-        graph, character, path, np.full(len(path), 0.2), SPACING, target, config, world, 3
-    )
+    monkeypatch.setattr(path_search, "STRAY", 3.0)
+    monkeypatch.setattr(path_search, "JUMP", 0.3)
+    found = search(tables, start, path, target, 150, 3, world)
+    twin = oracle.Search(graph, character, path, np.full(len(path), 0.2), SPACING, target, world, 3)
     frames, arrived, looked = twin.run(start, 0.0, 150)
     assert (found.arrived, found.looked) == (arrived, looked)
     assert found.frames.tolist() == frames
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_it_equals_its_slow_twin_on_paths_that_turn_back(seed: int, character: Character) -> None:
+def test_it_equals_its_slow_twin_on_paths_that_turn_back(
+    seed: int, character: Character, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng([seed, 9])
     graph = made_graph(seed)
     tables = SearchGraph(graph, character)
     start = AvatarState.at(graph, int(rng.choice(graph.frames)), 0.0, 0.0, 0.3)
     path = resampled([(0, 0), (0.7, 0.1), (0.7, 0.1), (0, 0), rng.uniform(-0.5, 0.5, 2)], SPACING)
-    config = SearchConfig(stray=3.0, jump=0.3)
+    monkeypatch.setattr(path_search, "STRAY", 3.0)
+    monkeypatch.setattr(path_search, "JUMP", 0.3)
     target = len(path) - 1.5
-    found = search(tables, start, path, target, 150, 3, config=config)
+    found = search(tables, start, path, target, 150, 3)
     facing = np.full(len(path), 0.2)
-    twin = oracle.Search(graph, character, path, facing, SPACING, target, config, None, 3)
+    twin = oracle.Search(graph, character, path, facing, SPACING, target, None, 3)
     frames, arrived, looked = twin.run(start, 0.0, 150)
     assert (found.arrived, found.looked) == (arrived, looked)
     assert found.frames.tolist() == frames
@@ -99,7 +101,7 @@ def test_a_walk_between_boxes_equals_its_slow_twin(aside: float, character: Char
     world = World((-2.0, -2.0, 6.0, 2.0), tuple(boxes))
     found = search(tables, start, path, 25.0, 80, 3, world)
     facing = np.full(len(path), 0.2)
-    twin = oracle.Search(graph, character, path, facing, SPACING, 25.0, SearchConfig(), world, 3)
+    twin = oracle.Search(graph, character, path, facing, SPACING, 25.0, world, 3)
     frames, arrived, looked = twin.run(start, 0.0, 80)
     assert (found.arrived, found.looked) == (arrived, looked)
     assert found.frames.tolist() == frames
@@ -121,16 +123,18 @@ def test_what_is_found_can_be_walked_and_is_placed_as_it_is_played(character: Ch
 
 
 @pytest.mark.parametrize("ahead_m", [1e18, 1e300])
-def test_what_is_faced_may_be_any_way_off(ahead_m: float, character: Character) -> None:
+def test_the_point_to_face_may_be_any_distance_away(
+    ahead_m: float, character: Character, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Beyond the end of the path it is the end that is faced; integers do not reach so far."""
     graph = made_graph(1)
     tables = SearchGraph(graph, character)
     start = AvatarState.at(graph, int(graph.frames[3]), 0.0, 0.0, 0.3)
     path = resampled([(0.0, 0.0), (1.0, 0.6)], SPACING)
-    far = SearchConfig(ahead_m=100.0)
-    expected = search(tables, start, path, 8.0, config=far)
-    object.__setattr__(far, "ahead_m", ahead_m)
-    found = search(tables, start, path, 8.0, config=far)
+    monkeypatch.setattr(path_search, "AHEAD_M", 100.0)
+    expected = search(tables, start, path, 8.0)
+    monkeypatch.setattr(path_search, "AHEAD_M", ahead_m)
+    found = search(tables, start, path, 8.0)
     assert len(found.frames) > 0
     assert found.frames.tolist() == expected.frames.tolist()
 
@@ -187,14 +191,7 @@ class _Only:
         self.graph = graph
 
 
-def test_what_makes_no_sense(character: Character) -> None:
-    with pytest.raises(UsageError, match="at least 0 and below 1, got 1"):
-        SearchConfig(facing=1.0)
-    for name in ("ahead_m", "pace", "stray", "jump", "margin_m"):
-        with pytest.raises(UsageError, match=f"{name} must be 0 or more"):
-            SearchConfig(**{name: -1.0})
-    with pytest.raises(UsageError, match="farthest_m"):
-        SearchConfig(farthest_m=0.0)
+def test_a_start_outside_the_graph_is_refused(character: Character) -> None:
     graph = made_graph(0)
     tables = SearchGraph(graph, character)
     nowhere = AvatarState(len(graph.database), np.zeros(4))

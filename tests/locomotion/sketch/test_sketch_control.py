@@ -12,7 +12,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.blending import Playback
 from dynresp.locomotion.sketch.path_search import SearchGraph
-from dynresp.locomotion.sketch.path_walk import SketchConfig, SketchedWalk
+from dynresp.locomotion.sketch.path_walk import SketchedWalk
 from dynresp.locomotion.sketch.sketch_chooser import SketchChooser
 from dynresp.locomotion.sketch.sketch_control import follow_sketch, reach
 from dynresp.locomotion.worlds.maze import random_maze
@@ -211,7 +211,7 @@ def test_progress_is_told(straight: SearchGraph) -> None:
 
     start = standing(straight, 0, 0, 0)
     follow_sketch(straight, start, [(0.0, 0.0), (6.0, 0.0)], progress=tell)
-    assert {stage for stage, _, _ in told} == {"looking for a way"}
+    assert {stage for stage, _, _ in told} == {"looking for a path through the graph"}
     done = [done for _, done, _ in told]
     assert done == sorted(done)
     assert done[0] == 0
@@ -221,12 +221,10 @@ def test_progress_is_told(straight: SearchGraph) -> None:
     reach(straight, start, (6.0, 0.0), world, progress=tell)
     stages = [stage for stage, _, _ in told]
     assert stages[0] == "looking for a path between the obstacles"
-    assert "there is none at hand, looking farther" in stages
+    assert "found none nearby, looking farther" in stages
 
 
 def test_what_makes_no_sense(straight: SearchGraph) -> None:
-    with pytest.raises(UsageError, match="horizon_m must be above 0"):
-        SketchConfig(horizon_m=0.0)
     start = standing(straight, 0, 0, 0)
     with pytest.raises(UsageError, match=r"points \(k, 2\)"):
         follow_sketch(straight, start, [1.0, 2.0])
@@ -248,7 +246,7 @@ def test_what_is_of_another_kind(straight: SearchGraph) -> None:
         follow_sketch(straight, path, start)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="the world must be a World of boxes, or None, got list"):
         follow_sketch(straight, start, path, [])  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="the configuration must be a SketchConfig"):
+    with pytest.raises(UsageError, match="stop must be True or False, got dict"):
         reach(straight, start, (1.0, 0.0), None, {})  # type: ignore[arg-type]
     for wrong in (np.nan, np.inf, "a", None):
         with pytest.raises(UsageError, match="finite x, y"):
