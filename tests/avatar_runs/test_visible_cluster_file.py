@@ -87,8 +87,8 @@ def test_another_version_of_the_clustering_is_another_file(
         ("log_probabilities", np.full((180, 2), np.inf, dtype="<f4"), "no sense"),
         ("log_probabilities", np.full((180, 2), -np.inf, dtype="<f4"), "no sense"),
         ("log_probabilities", np.full((180, 2), np.nan, dtype="<f4"), "no sense"),
-        ("examples", np.array([20, 999], dtype="<i4"), "not there"),
-        ("ages", np.full(7, -1, dtype="<i4"), "not there"),
+        ("examples", np.array([20, 999], dtype="<i4"), "does not have"),
+        ("ages", np.full(7, -1, dtype="<i4"), "does not have"),
     ],
 )
 def test_damaged_files_are_refused(

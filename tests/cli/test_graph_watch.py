@@ -99,7 +99,7 @@ class TestFile:
         assert first.exit_code == 0, first.stderr
         assert "drawing silhouettes" in first.stderr
         assert "nobody may be in the picture" in first.stderr
-        assert "10 are due" in first.stdout
+        assert "10 are needed" in first.stdout
         out = video.parent / "first"
         content = json.loads((out / "result.json").read_text())
         assert {name for name, what in content["files"].items() if what == "written"} == FILES

@@ -79,7 +79,7 @@ def test_a_shard_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     with pytest.raises(DynrespError) as caught:
         collected(tmp_path, "kills")
     assert "3 worker processes died while making shard 2 (signal 9)" in str(caught.value)
-    assert "the same command goes on" in str(caught.value)
+    assert "the same command continues" in str(caught.value)
 
 
 @pytest.mark.usefixtures("stand_in")
