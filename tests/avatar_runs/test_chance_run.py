@@ -9,6 +9,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_walk(graph: MotionGraph, character: Character) -> None:
     one, again, other = (chance_run(graph, character, 4.0, seed) for seed in (3, 3, 4))
     np.testing.assert_array_equal(one.motion.poses, again.motion.poses)

@@ -41,6 +41,7 @@ def test_an_action_is_described_in_words(
     assert describe_action(action(*corners), 1.0) == description
 
 
+@pytest.mark.slow
 def test_given_answers(forest: ClusterForest, character: Character, tmp_path: Path) -> None:
     run = choice_run(forest.graph, character, given_answers([1, None, 0]), forest=forest)
     content = run.save(tmp_path, video=False)

@@ -9,6 +9,7 @@ import pytest
 from dynresp.avatar_runs import chance_run, choice_run, hit_run, sketch_run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "module", [chance_run, choice_run, hit_run, sketch_run], ids=lambda m: m.__name__
 )

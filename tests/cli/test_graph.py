@@ -103,6 +103,7 @@ class TestWalk:
             assert (out / name).read_bytes().startswith(PNG)
         assert "made of built-in motion" in result.stdout
 
+    @pytest.mark.slow
     def test_same_seed_same_bytes(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
         words = ("graph", "walk", graph, "--seconds", 2, "--seed", 5, "--no-video", "--out")
         for name in ("a", "b"):
@@ -117,6 +118,7 @@ class TestWalk:
         assert (tmp_path / "out").read_text() == "mine"
 
 
+@pytest.mark.slow
 class TestSketch:
     def test_along_a_path(self, dynresp: Command, graph: Path, tmp_path: Path) -> None:
         path = tmp_path / "path.csv"
@@ -239,6 +241,7 @@ def test_over_rough_terrain(dynresp: Command, tmp_path: Path, motions_folder: Pa
     assert dynresp(*words, "--maze").exit_code == 2
 
 
+@pytest.mark.slow
 def test_the_step_stool(dynresp: Command, tmp_path: Path) -> None:
     graph, out = tmp_path / "graph.npz", tmp_path / "out"
     assert dynresp("graph", "build", "stool", "--out", graph).exit_code == 0

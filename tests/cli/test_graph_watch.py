@@ -94,6 +94,7 @@ def first(graph: Path, video: Path, tmp_path_factory: pytest.TempPathFactory) ->
     return CliRunner().invoke(app, [*words, str(video.parent / "first")])
 
 
+@pytest.mark.slow
 class TestFile:
     def test_somebody_is_followed(self, first: Result, video: Path) -> None:
         assert first.exit_code == 0, first.stderr
@@ -306,6 +307,7 @@ class Camera:
         pass
 
 
+@pytest.mark.slow
 class TestCamera:
     @pytest.fixture
     def plugged_in(

@@ -29,6 +29,7 @@ def quick(world: Path, what: str = "") -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_whole_run(world: Path, dynresp: Command) -> None:
     out = world / "out"
     result = dynresp(
@@ -203,6 +204,7 @@ def test_the_demo_needs_no_network_and_little_time(tmp_path: Path) -> None:
     assert "built-in motions take the place" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_renderer_that_is_not_there_costs_no_more_than_the_video(world: Path) -> None:
     done = subprocess.run(
         [

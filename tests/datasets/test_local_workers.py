@@ -74,6 +74,7 @@ def test_the_shard_of_a_killed_worker_is_made_by_another(tmp_path: Path) -> None
     assert (tmp_path / "2").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stand_in")
 def test_a_shard_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     with pytest.raises(DynrespError) as caught:
@@ -82,12 +83,14 @@ def test_a_shard_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     assert "the same command continues" in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stand_in")
 def test_deaths_before_a_worker_begins_do_not_count_against_a_shard(tmp_path: Path) -> None:
     assert sorted(collected(tmp_path, "kills while loading")) == [0, 1, 2, 3, 4]
     assert len(list(tmp_path.iterdir())) >= 7
 
 
+@pytest.mark.slow
 def test_workers_that_die_at_once_are_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -113,6 +113,7 @@ def _places(value: Any, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
+@pytest.mark.slow
 @given(data=st.data())
 def test_whatever_a_manifest_says_it_is_parsed_or_refused(
     data: st.DataObject, manifest: dict[str, Any]

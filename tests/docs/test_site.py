@@ -62,6 +62,7 @@ class Addresses(HTMLParser):
             (self.loaded if loads else self.links).append(address)
 
 
+@pytest.mark.slow
 def test_the_site_loads_nothing_from_the_network(site: Path) -> None:
     files = sorted(site.rglob("*.html"))
     assert len(files) > 25

@@ -27,6 +27,7 @@ def test_both_documents_show_one() -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("document", "text"), EXAMPLES, ids=[name for name, _ in EXAMPLES])
 def test_an_example_runs(document: str, text: str, tmp_path: Path) -> None:
     experiment = parse_experiment(tomllib.loads(text), document)

@@ -28,6 +28,7 @@ def test_a_person_in_a_room_with_moving_light_is_found(seed, who, tmp_path) -> N
     assert np.min(overlaps) > 0.6
 
 
+@pytest.mark.slow
 def test_a_person_who_stands_still_does_not_fade(tmp_path) -> None:
     actor = person("16", tmp_path)
     motion = Motion(np.tile(actor.rest_pose, (300, 1)), 10.0)

@@ -20,6 +20,7 @@ def filmed(who: str, seed: int, folder, fps: float = 30.0) -> list[np.ndarray]:
     return list(film(Motion(np.concatenate(parts), fps), actor, filming))
 
 
+@pytest.mark.slow
 def test_an_avatar_follows_a_stranger_in_a_file(forest, table, recogniser, tmp_path) -> None:
     path = tmp_path / "video.mp4"
     write_video(path, iter(filmed("hys", 4, tmp_path)), 30.0)

@@ -104,6 +104,7 @@ def test_cell_placements_convert_to_metres_and_back(
         made.cell_placement(terrain, np.zeros(4))
 
 
+@pytest.mark.slow
 def test_other_coordinates_blocks_and_places_are_refused(
     made: TerrainGraph, character: Character
 ) -> None:
@@ -131,6 +132,7 @@ def test_other_coordinates_blocks_and_places_are_refused(
         start_on_terrain(made, terrain, [-9.0, -9.0], [0.0, 0.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_search_reaches_a_goal_exactly_if_its_slow_twin_does(
     made: TerrainGraph, seed: int, monkeypatch: pytest.MonkeyPatch

@@ -264,6 +264,7 @@ def test_seeds_are_sound(form: Format, tmp_path: Path) -> None:
         check_valid(form.read(path, tmp_path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 def test_300_damaged_files(form: Format, tmp_path: Path) -> None:
     check_damaged_files(form, tmp_path, 300)
