@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import sys
 from collections.abc import Callable
 from numbers import Integral, Real
-from typing import Any
 
 from dynresp.support.errors import UsageError
 
@@ -77,21 +75,6 @@ def check_vector(name: str, value: object, count: int, above: float = -math.inf)
     if len(numbers) != count or not all(above < _as_float(x) <= LARGEST for x in numbers):
         bound = "" if above == -math.inf else f" above {above:g}"
         raise UsageError(f"{name} must be {count} finite numbers{bound}, got {_shown(repr, value)}")
-
-
-def check_numbers(settings: Any) -> None:
-    """Refuse a dataclass whose fields of type `float` or `int` are not finite numbers.
-
-    Args:
-        settings: The dataclass's object.
-
-    Raises:
-        UsageError: A field is not such a number; the message names it.
-    """
-    for field in dataclasses.fields(settings):
-        if str(field.type) in ("float", "int"):
-            value = getattr(settings, field.name)
-            check_number(field.name, value, whole=str(field.type) == "int")
 
 
 def _as_float(value: object) -> float:
