@@ -11,6 +11,7 @@ def drawn(poses, character, views):
     return np.array([mask.copy() for _, _, mask in draw_silhouettes(poses, character, views)])
 
 
+@pytest.mark.slow
 def test_they_equal_those_of_the_slow_twin(character: Character, rng: np.random.Generator) -> None:
     poses = np.concatenate([character.rest_pose[None], random_poses(rng, 2)])
     views = Viewpoints(3, 0.3)

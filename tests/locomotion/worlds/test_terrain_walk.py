@@ -163,6 +163,7 @@ def test_the_search_reaches_a_goal_exactly_if_its_slow_twin_does(
             assert walk.off_goal <= 0.15
 
 
+@pytest.mark.slow
 def test_walks_stand_on_blocks_and_end_at_the_goal(made: TerrainGraph) -> None:
     terrain = Terrain.random(np.random.default_rng(4), 12, 12, highest=3, steepest=1)
     start = start_on_terrain(made, terrain, [2.0, 2.0], [5.0, 5.0])

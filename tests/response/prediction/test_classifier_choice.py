@@ -99,6 +99,7 @@ def _responses(
     return Responder(character, library, CONFIG, threads=1, chooser=chooser).respond(hits)
 
 
+@pytest.mark.slow
 def test_on_its_training_hits_it_chooses_as_the_full_search(
     character: Character,
     library: ReactionLibrary,
@@ -121,6 +122,7 @@ def test_on_its_training_hits_it_chooses_as_the_full_search(
         assert mine.graze == other.graze
 
 
+@pytest.mark.slow
 def test_two_aligned_choices_are_no_worse_than_one(
     character: Character,
     library: ReactionLibrary,
