@@ -8,6 +8,7 @@ import numpy as np
 
 from dynresp.locomotion.worlds.obstacles import Obstacle, World
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import sparse_graph
 from dynresp.support.checks import check_number
 from dynresp.support.errors import UsageError
 
@@ -54,7 +55,6 @@ def random_maze(
     Raises:
         UsageError: There are less than two cells, or a share is not from 0 to 1.
     """
-    from scipy.sparse import csr_array
     from scipy.sparse.csgraph import minimum_spanning_tree, shortest_path
 
     check_number("columns", columns, 1, whole=True)
@@ -70,12 +70,13 @@ def random_maze(
             np.stack([cells[:, :-1].ravel(), cells[:, 1:].ravel()], axis=1),
         ]
     )
-    size = (cells.size, cells.size)
     weights = 1.0 + rng.random(len(pairs))
-    tree = minimum_spanning_tree(csr_array((weights, pairs.T), shape=size)).toarray() > 0
+    first, second = pairs.T
+    spanning = minimum_spanning_tree(sparse_graph(weights, first, second, cells.size))
+    tree = spanning.toarray() > 0
     passages = tree[pairs[:, 0], pairs[:, 1]] | (rng.random(len(pairs)) < loops)
     narrowed = passages & (rng.random(len(pairs)) < narrow)
-    edges = csr_array((weights[passages], pairs[passages].T), shape=size)
+    edges = sparse_graph(weights[passages], first[passages], second[passages], cells.size)
     _, before = shortest_path(edges, directed=False, indices=0, return_predecessors=True)
     path = [cells.size - 1]
     while path[-1] != 0:

@@ -9,7 +9,7 @@ from dynresp.locomotion.worlds.collisions import CollisionGrid
 from dynresp.locomotion.worlds.obstacles import World
 from dynresp.locomotion.worlds.paths import as_point, resampled
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.arrays import IndexArray
+from dynresp.support.arrays import IndexArray, sparse_graph
 from dynresp.support.errors import DynrespError, UsageError
 
 # Side of the cells of the grid, and about the distance between the points of a path [m].
@@ -122,14 +122,13 @@ def plan_path(
         UsageError: The world has too many cells.
         DynrespError: There is no path, or no free ground near the start or the goal.
     """
-    from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
     ends = np.stack([as_point(start, "a start"), as_point(goal, "a goal")])
     grid = _Grid(world, np.asarray(blocked, dtype=np.float64).reshape(-1, 3))
     first, last = grid.nearest_free(ends[0], "start"), grid.nearest_free(ends[1], "goal")
     a, b, costs = grid.edges()
-    edges = csr_array((costs, (a, b)), shape=(grid.cells, grid.cells))
+    edges = sparse_graph(costs, a, b, grid.cells)
     _, before = dijkstra(edges, directed=False, indices=[first], return_predecessors=True)
     if first != last and before[0, last] < 0:
         raise DynrespError(
@@ -166,7 +165,6 @@ def fit_path(
             within 1 m of it, or, if obstacles cut it off, within 4 m.
         DynrespError: There is no path, or no free ground near the start or the goal.
     """
-    from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
 
@@ -214,9 +212,8 @@ def fit_path(
         rows.append(source)
         columns.append(target)
         weights.append(2.0 * _CELL_M * (1e-3 + _PULL * away[target] ** 2))
-        size = (len(keys), len(keys))
-        edges = csr_array(
-            (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=size
+        edges = sparse_graph(
+            np.concatenate(weights), np.concatenate(rows), np.concatenate(columns), len(keys)
         )
         begin = int(np.searchsorted(keys, first))
         end = int(np.searchsorted(keys, (len(points) - 1) * grid.cells + last))
