@@ -29,8 +29,8 @@ from IPython import display as shows
 from PIL import Image as Pixels
 from study import percent, table
 
-from dynresp.experiments.response_files import side_of, spoken
-from dynresp.experiments.response_story import show
+from dynresp.experiments.response_files import direction_words, reaction_title
+from dynresp.experiments.response_story import response_story
 from dynresp.response.budget import chooser_for
 from dynresp.response.responder import Responder
 from dynresp.view.filmstrip import write_filmstrip
@@ -63,7 +63,7 @@ def told(response):
     """Choice, exit [s], entry [s] and error [m]."""
     fps = response.motion.fps
     return (
-        spoken(response.choice),
+        reaction_title(response.choice),
         (response.exit - response.contact_frame) / fps,
         response.entry / fps,
         response.error,
@@ -92,10 +92,10 @@ def strip(sample, response, who: str) -> Pixels.Image:
     name, leave, _, error = told(response)
     title = f"{who}: {name}"
     subtitle = (
-        f"{asked['mass_kg']:.1f} kg, {asked['speed_m_s']:.1f} m/s, from {side_of(asked['from_deg'])}; "
+        f"{asked['mass_kg']:.1f} kg, {asked['speed_m_s']:.1f} m/s, from {direction_words(asked['from_deg'])}; "
         f"exit {leave:.2f} s, error {error:.2f} m"
     )
-    story = show(response, sample.impact, 0.5, title, subtitle).story
+    story = response_story(response, sample.impact, 0.5, title, subtitle).story
     with tempfile.TemporaryDirectory() as folder:
         write_filmstrip(story, Path(folder) / "strip.png", moments=7, width_px=1600)
         picture = Pixels.open(Path(folder) / "strip.png").convert("RGB")
