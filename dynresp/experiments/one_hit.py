@@ -198,7 +198,9 @@ def hit(
         raise UnknownNameError("budget", budget, BUDGETS)
     if not isinstance(library, ReactionLibrary):
         library = str(library)
-    responder, record = _responder(library, budget, None if motions is None else Path(motions))
+    responder, record = _responder(
+        library, budget, tuple(motion_folders(None if motions is None else Path(motions)))
+    )
     fps = responder.config.physics.fps
     base: dict[str, Any] = {}
     if isinstance(motion, Motion):
@@ -227,7 +229,7 @@ def hit(
 
 @functools.lru_cache(maxsize=_KEPT)
 def _responder(
-    library: ReactionLibrary | str, budget: str, motions: Path | None
+    library: ReactionLibrary | str, budget: str, folders: tuple[Path, ...]
 ) -> tuple[Responder, dict[str, Any]]:
     """A responder, and what `result.json` says of it."""
     from dynresp.motion.character import default_character
@@ -236,7 +238,6 @@ def _responder(
     character, config = default_character(), ResponseConfig()
     which = library if isinstance(library, str) else library.name
     if isinstance(library, str):
-        folders = motion_folders(motions)
         library = load_named_library(library, folders, Path(), config.physics.fps, character)
     table = ChoiceTable.model_validate({"budget": budget})
     choosing = make_chooser(table, character, library, config, Path())

@@ -1,17 +1,15 @@
 """The compiled part of the time alignment: mismatches between frames, sampling and descent.
 
-The first call of a kernel compiles it (some seconds) or loads it from numba's cache. Importing this
-module imports numba (a third of a second); so import it where it is used.
-
 The mismatch of two windows is that of `window_kernel`. Here a window may begin between two frames:
 positions are interpolated along straight lines, quaternions along the shorter chord, and brought
 back to unit length.
 
 A track is stored as seven rows of float32, x y z w i j k; each has the bodies of the first frame,
 then those of the next, and so on. A window is then one range of every row, wherever it begins, and
-the next frames are the same range, shifted by the number of bodies. Nearly all time goes into the
-loop over that range. It writes only sums, so that the compiler makes vector instructions without a
-check of which arrays overlap. The same pass gives the slopes along both times.
+the next frames are the same range, shifted by the number of bodies. The loop over that range is the
+only hot one. It writes only sums, so that the compiler makes vector instructions without a
+check of which arrays overlap. The same pass gives the slopes along both times. A first call
+compiles; importing this module imports numba, so import it where it is used.
 """
 
 from __future__ import annotations
