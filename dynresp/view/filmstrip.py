@@ -9,7 +9,7 @@ does for both.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -311,8 +311,8 @@ class _Strip:
         """A strip of floor between two heights that fades before and behind them."""
         y = panel.top - (np.arange(panel.height) + 0.5) * panel.pixel
         rise = (y - np.clip(y, low, high)) / _FLOOR_DEPTH
-        canvas.rgba[..., 3] = 0.6 * np.clip(1.0 - rise**2, 0.0, 1.0)[:, None]
-        canvas.rgba[..., :3] = canvas.rgba[..., 3:] * np.array(_FLOOR)
+        alpha = 0.6 * np.clip(1.0 - rise**2, 0.0, 1.0)
+        canvas.rgba[:] = (alpha[:, None] * np.array([*_FLOOR, 1.0]))[:, None]
 
 
 class _Panel:
@@ -340,13 +340,19 @@ class _Panel:
 
     def show(self, canvas: raster.Canvas, above: float) -> None:
         """Put a canvas of its own into the figure."""
-        self.axes.imshow(
-            canvas.picture(),
-            extent=(self.left, self.right, self.bottom, self.top),
-            aspect="auto",
-            interpolation="nearest",
-            zorder=above,
-        )
+        from matplotlib.artist import Artist
+
+        axes = self.axes
+
+        class Pixels(Artist):
+            """An image whose pixels are those of the figure: `imshow` would sample them anew."""
+
+            def draw(self, renderer: Any) -> None:
+                corner = axes.bbox.p0.round()
+                # Renderers take the lowest row first.
+                renderer.draw_image(renderer.new_gc(), *corner, canvas.picture()[::-1])
+
+        axes.add_artist(Pixels()).set_zorder(above)
 
 
 def _line(figure: Figure, a: tuple[float, float], b: tuple[float, float]) -> Line2D:

@@ -110,12 +110,11 @@ class Canvas:
 
     def picture(self) -> npt.NDArray[np.uint8]:
         """(height, width, 4), 0 to 255, colours not multiplied by alpha, as image files need it."""
-        alpha = self.rgba[..., 3:]
-        scale = np.where(alpha > 0, 255.0 / np.maximum(alpha, 1e-6), 0.0).astype(np.float32)
-        out = np.empty(self.rgba.shape, dtype=np.uint8)
-        out[..., :3] = np.minimum(self.rgba[..., :3] * scale + 0.5, 255.0)
-        out[..., 3:] = np.minimum(alpha * 255.0 + 0.5, 255.0)
-        return out
+        # Where nothing is drawn, colours are 0 already.
+        scaled = self.rgba * (255.0 / np.maximum(self.rgba[..., 3:], 1e-6))
+        scaled[..., 3] = 255.0 * self.rgba[..., 3]
+        scaled += 0.5
+        return np.minimum(scaled, 255.0, out=scaled).astype(np.uint8)
 
 
 def draw(
