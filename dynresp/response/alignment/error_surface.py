@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from dynresp.motion.character import Character
 from dynresp.motion.rotations import FloatArray
+from dynresp.response.alignment.alignment import Aligner
 from dynresp.response.look_ahead import base_poses
 from dynresp.response.response import (
     CARRY_ON,
@@ -16,9 +16,8 @@ from dynresp.response.response import (
     Response,
     ResponseConfig,
 )
-from dynresp.response.search.full_search import search
 from dynresp.response.search.full_search_choice import entry_range
-from dynresp.response.windows.windows import ReactionTrack, library_windows, trace_windows
+from dynresp.response.windows.windows import ReactionTrack
 from dynresp.support.errors import MotionError
 
 
@@ -32,7 +31,7 @@ class AlignmentSurface:
         entries_s: (entries,) time in the reaction's clip, or in the base motion [s].
     """
 
-    errors: npt.NDArray[np.float32]
+    errors: FloatArray
     exits_s: FloatArray
     entries_s: FloatArray
 
@@ -71,9 +70,11 @@ def alignment_surface(
         bounds = entry_range(len(poses), config)
     states = character.kinematics(poses)
     track = ReactionTrack(response.choice, states.centers, states.quaternions, bounds)
-    cut = trace_windows(seen.centers, seen.quaternions, window)
-    found = search(cut, library_windows([track], window)).surface(response.choice)
-    entries_s = np.asarray((found.entry_frames + first) / fps, np.float64)
-    return AlignmentSurface(
-        found.errors, np.asarray(found.exit_frames / fps, np.float64), entries_s
+    exits = np.array(window.exit_frames, np.float64)
+    earliest, stop = track.entry_range or (0, len(poses) - window.window_frames + 1)
+    entries = np.arange(earliest, stop, window.entry_step, dtype=np.float64)
+    # The full search would compile a kernel for this that the response itself did not need.
+    errors = Aligner([track], window).errors(
+        seen.centers, seen.quaternions, response.choice, exits[:, None], entries
     )
+    return AlignmentSurface(errors, exits / fps, (entries + first) / fps)
