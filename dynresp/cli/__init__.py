@@ -6,6 +6,7 @@ the commands, so that help appears at once.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import warnings
@@ -39,6 +40,8 @@ def _run() -> None:
     renderer = os.environ.pop("MUJOCO_GL", None)
     if renderer is not None:
         os.environ.setdefault("DYNRESP_GL", renderer)
+    # A tenth of the time of a short command would be looking for garbage among what it imports.
+    gc.set_threshold(100_000, 20, 20)
     # Imported here, where an interruption is caught.
     from dynresp.cli.app import app
 

@@ -44,7 +44,8 @@ def _fading(value, slope, at, length):
     if at >= length:
         return 0.0
     u = at / length
-    return (1.0 - u) ** 2 * (value * (1.0 + 2.0 * u) + slope * length * u)
+    left = 1.0 - u
+    return left * left * (value * (1.0 + 2.0 * u) + slope * length * u)
 
 
 @helper
@@ -230,9 +231,9 @@ def _restrain(stance, max_distance, shift):
     """Let a foot slide that would be held too far from where it is played."""
     start, stop, goes_on = stance
     if goes_on:
-        max_distance = max(max_distance, math.hypot(shift[start - 1, 0], shift[start - 1, 1]))
+        max_distance = max(max_distance, np.hypot(shift[start - 1, 0], shift[start - 1, 1]))
     for k in range(start, stop):
-        part = max_distance / max(max_distance, math.hypot(shift[k, 0], shift[k, 1]))
+        part = max_distance / max(max_distance, np.hypot(shift[k, 0], shift[k, 1]))
         shift[k, 0] *= part
         shift[k, 1] *= part
 
@@ -280,7 +281,8 @@ def _swing(last, following, known, ease, values):
         types.BaseTuple.from_types((types.int64,) * 4, FitTimes),
         types.BaseTuple.from_types((types.float64,) * 6, FitLimits),
         types.BaseTuple.from_types((_ROWS, _ROWS), Correction),
-    )
+    ),
+    interpreted_first=True,
 )
 def correct_kernel(played, source, demands, shape, leg, kept, times, limits, correction):
     """Write the corrections of one foot.

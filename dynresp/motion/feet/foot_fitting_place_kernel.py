@@ -127,13 +127,13 @@ def into_discs(x, y, discs):
     for step in range(_STEPS):
         out, farthest = _NEAR, -1
         for k in range(len(discs)):
-            away = math.hypot(x - discs[k, 0], y - discs[k, 1]) - discs[k, 2]
+            away = np.hypot(x - discs[k, 0], y - discs[k, 1]) - discs[k, 2]
             if away > out:
                 out, farthest = away, k
         if farthest < 0:
             return x, y, True
         to_x, to_y = discs[farthest, 0] - x, discs[farthest, 1] - y
-        part = out / max(math.hypot(to_x, to_y), 1e-12) * 4.0 / max(step, 4)
+        part = out / max(np.hypot(to_x, to_y), 1e-12) * 4.0 / max(step, 4)
         x, y = x + min(part, 1.0) * to_x, y + min(part, 1.0) * to_y
     return x, y, False
 
@@ -151,7 +151,7 @@ def _discs(start, stop, played, shift, leg, drop, max_distance, discs):
         discs[at, 0] += leg.hips[k, 0] - played.ankles[k, 0]
         discs[at, 1] += leg.hips[k, 1] - played.ankles[k, 1]
         down = max(leg.hips[k, 2] - drop - played.ankles[k, 2] - shift[k, 2], 0.0)
-        discs[at, 2] = math.sqrt(max(leg.reach[k] ** 2 - down**2, 0.0))
+        discs[at, 2] = math.sqrt(max(leg.reach[k] * leg.reach[k] - down * down, 0.0))
         discs[at + 1, 2] = max_distance
 
 
@@ -161,7 +161,7 @@ def _near(x, y, start, last, most, shift):
     if last < 0:
         return x, y
     off_x, off_y = x - shift[last, 0], y - shift[last, 1]
-    part = min(1.0, most * (start - last) / max(math.hypot(off_x, off_y), 1e-12))
+    part = min(1.0, most * (start - last) / max(np.hypot(off_x, off_y), 1e-12))
     return shift[last, 0] + part * off_x, shift[last, 1] + part * off_y
 
 

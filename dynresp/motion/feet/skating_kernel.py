@@ -60,7 +60,7 @@ def least_slide(shifts, touching):
     return x, y
 
 
-@compiled(types.float64[:](_CORNERS, types.float64))
+@compiled(types.float64[:](_CORNERS, types.float64), interpreted_first=True)
 def slides_kernel(corners, touch):
     """How far a foot slides from each frame to the next.
 

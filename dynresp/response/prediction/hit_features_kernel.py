@@ -35,7 +35,7 @@ def _write(cosine, sine, vector, features, hit, at):
     features[hit, at + 2] = vector[2]
 
 
-@compiled(_SIGNATURE)
+@compiled(_SIGNATURE, interpreted_first=True)
 def features_kernel(poses, velocities, frames, parents, offsets, centers, shares, chosen, features):
     """Write the features of hits.
 
@@ -123,7 +123,7 @@ def features_kernel(poses, velocities, frames, parents, offsets, centers, shares
                 )
                 seen = multiply(facing, row(turn, body))
                 sign = -1.0 if seen[0] < 0.0 else 1.0
-                length = math.sqrt(seen[1] ** 2 + seen[2] ** 2 + seen[3] ** 2)
+                length = math.sqrt(seen[1] * seen[1] + seen[2] * seen[2] + seen[3] * seen[3])
                 scale = 2.0 * sign
                 if length >= _SMALL:
                     scale *= math.atan2(length, sign * seen[0]) / length
