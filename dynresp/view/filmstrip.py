@@ -25,6 +25,7 @@ from dynresp.view.story import PHASE_NAMES, Story
 from dynresp.view.story_moments import Moment, camera_yaw, choose_moments, main_direction
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -340,19 +341,20 @@ class _Panel:
 
     def show(self, canvas: raster.Canvas, above: float) -> None:
         """Put a canvas of its own into the figure."""
-        from matplotlib.artist import Artist
+        self.axes.add_artist(_pixels(self.axes, canvas)).set_zorder(above)
 
-        axes = self.axes
 
-        class Pixels(Artist):
-            """An image whose pixels are those of the figure: `imshow` would sample them anew."""
+def _pixels(axes: Axes, canvas: raster.Canvas) -> Artist:
+    """An image whose pixels are those of the figure; `imshow` would sample them once more."""
+    from matplotlib.artist import Artist
 
-            def draw(self, renderer: Any) -> None:
-                corner = axes.bbox.p0.round()
-                # Renderers take the lowest row first.
-                renderer.draw_image(renderer.new_gc(), *corner, canvas.picture()[::-1])
+    class Pixels(Artist):
+        def draw(self, renderer: Any) -> None:
+            corner = axes.bbox.p0.round()
+            # Renderers take the lowest row first.
+            renderer.draw_image(renderer.new_gc(), *corner, canvas.picture()[::-1])
 
-        axes.add_artist(Pixels()).set_zorder(above)
+    return Pixels()
 
 
 def _line(figure: Figure, a: tuple[float, float], b: tuple[float, float]) -> Line2D:
