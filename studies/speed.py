@@ -1,4 +1,4 @@
-"""Speed: the benchmarks of `dynresp bench`, each with the targets that it has to reach."""
+"""Speed: benchmarks, each with the targets that it has to reach."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ def _physics(options: Options) -> BenchResult:
 
 
 def _full_search(options: Options) -> BenchResult:
-    from dynresp.bench import full_search_speed
+    from studies.benchmarks import full_search_speed
 
     return full_search_speed.run(options.seed)
 
 
 def _prediction(options: Options) -> BenchResult:
-    from dynresp.bench import prediction_speed
+    from studies.benchmarks import prediction_speed
 
     return prediction_speed.run(options.seed, model=walk_classifier())
 
 
 def _alignment(options: Options) -> BenchResult:
-    from dynresp.bench import alignment_speed
+    from studies.benchmarks import alignment_speed
 
     return alignment_speed.run(options.seed)
 
@@ -49,7 +49,7 @@ def _generation(options: Options) -> BenchResult:
 
 
 def _graph_building(options: Options) -> BenchResult:
-    from dynresp.bench import graph_speed
+    from studies.benchmarks import graph_speed
 
     sizes = () if options.quick else (25_000, 50_000, 100_000)
     return graph_speed.run(options.seed, options.motions, sizes=sizes)

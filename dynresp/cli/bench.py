@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -30,44 +29,6 @@ def physics(seed: Seed = None, as_json: Json = False) -> None:
 
 
 @app.command()
-def search(seed: Seed = None, as_json: Json = False) -> None:
-    """Measure the full search (oracle), beside NumPy and plain Python."""
-    typer.echo("searching for about five seconds ...", err=True)
-    from dynresp.bench import full_search_speed as bench
-
-    _print(bench.run(seed or 0), as_json)
-
-
-@app.command()
-def align(seed: Seed = None, as_json: Json = False) -> None:
-    """Measure how fast one reaction is aligned, beside trying all pairs."""
-    typer.echo("simulating and aligning for about ten seconds ...", err=True)
-    from dynresp.bench import alignment_speed as bench
-
-    _print(bench.run(seed or 0), as_json)
-
-
-@app.command()
-def predict(
-    classifier: Annotated[
-        Path | None,
-        typer.Option(
-            "--classifier",
-            metavar="MODEL",
-            help="A classifier with its scikit-learn models; by default an artificial one.",
-        ),
-    ] = None,
-    seed: Seed = None,
-    as_json: Json = False,
-) -> None:
-    """Measure how fast a classifier predicts, beside scikit-learn."""
-    typer.echo("training and predicting for about ten seconds ...", err=True)
-    from dynresp.bench import prediction_speed as bench
-
-    _print(bench.run(seed or 0, model=classifier), as_json)
-
-
-@app.command()
 def respond(
     classifier: ChosenClassifier = None,
     motions: Motions = None,
@@ -88,29 +49,6 @@ def generate(motions: Motions = None, seed: Seed = None, as_json: Json = False) 
     from dynresp.bench import generation_speed as bench
 
     _print(bench.run(seed or 0, motions), as_json)
-
-
-@app.command()
-def graph(
-    sizes: Annotated[
-        list[int] | None,
-        typer.Option(
-            "--sizes",
-            min=1000,
-            max=1_000_000,
-            metavar="N",
-            help="Also build a graph of N frames; may be given several times.",
-        ),
-    ] = None,
-    motions: Motions = None,
-    seed: Seed = None,
-    as_json: Json = False,
-) -> None:
-    """Measure how fast a graph of 12,879 frames is built, beside NumPy."""
-    typer.echo("building graphs for about half a minute ...", err=True)
-    from dynresp.bench import graph_speed as bench
-
-    _print(bench.run(seed or 0, motions, sizes=sizes or ()), as_json)
 
 
 def _print(result: BenchResult, as_json: bool) -> None:

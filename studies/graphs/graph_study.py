@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from dynresp.bench.graph_database import graphs_at_hand
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.sources.motion_folders import motion_folders
+from studies.benchmarks.graph_database import graphs_at_hand
 from studies.study import Columns, Options, Value
 
 FLAT = ("walking", "builtin")

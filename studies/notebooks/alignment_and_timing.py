@@ -28,7 +28,6 @@ import study
 from matplotlib import pyplot as plt
 from study import percent, table, words
 
-from dynresp.bench import alignment_speed as bench_align
 from dynresp.bench import response_speed as bench_respond
 from dynresp.bench.machine import describe_machine, machine_line
 from dynresp.response.alignment.alignment import Aligner, AlignmentConfig
@@ -43,6 +42,7 @@ from dynresp.response.search.full_search_choice import (
     entry_range,
     reaction_tracks,
 )
+from studies.benchmarks import alignment_speed as bench_align
 
 study.style()
 data = study.dataset("walk")

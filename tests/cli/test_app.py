@@ -26,12 +26,8 @@ COMMANDS = (
     ("reactions", "list"),
     ("bench",),
     ("bench", "physics"),
-    ("bench", "search"),
-    ("bench", "predict"),
-    ("bench", "align"),
     ("bench", "respond"),
     ("bench", "generate"),
-    ("bench", "graph"),
 )
 # Packages that take long to import; help must do without them.
 HEAVY = (

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from dynresp.bench.window_error_twin import cut_window, window_error
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.alignment.alignment import AlignmentConfig
 from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
+from studies.benchmarks.window_error_twin import cut_window, window_error
 
 Track = tuple[FloatArray, FloatArray]
 

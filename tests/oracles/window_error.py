@@ -2,15 +2,15 @@
 
 `dynresp.response.search.full_search` must equal it.
 
-The window error itself is `dynresp.bench.window_error_twin`, which the benchmark of the installed
-package times; here is the search around it.
+The window error itself is `studies.benchmarks.window_error_twin`, which a benchmark
+times; here is the search around it.
 """
 
 from collections.abc import Sequence
 
-from dynresp.bench.window_error_twin import error_surface
 from dynresp.motion.rotations import FloatArray
 from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
+from studies.benchmarks.window_error_twin import error_surface
 
 __all__ = ["best_match", "error_surface", "reaction_surface"]
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from dynresp.bench.full_search_speed import synthetic_track
 from dynresp.motion import rotations
 from dynresp.response.alignment.alignment import Aligner, Alignment, AlignmentConfig
 from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
+from studies.benchmarks.full_search_speed import synthetic_track
 from tests.oracles.alignment import Track, interpolated
 
 BODIES = 5

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.bench import graph_database
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.motion import rotations
@@ -14,6 +13,7 @@ from dynresp.motion.character import Character, default_character
 from dynresp.motion.motion import Motion
 from dynresp.physics.impacts import Ball, Punch, Push
 from dynresp.support.errors import MissingMotionDataError, UnknownNameError, UsageError
+from studies.benchmarks import graph_database
 from studies.graphs import (
     avatar_hits,
     cluster_fit,

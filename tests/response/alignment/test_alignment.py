@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from dynresp.bench import alignment_speed as bench
 from dynresp.response.alignment.alignment import Aligner, AlignmentConfig
 from dynresp.response.search.full_search import ERROR_FLOOR, search
 from dynresp.response.windows.windows import (
@@ -20,6 +19,7 @@ from dynresp.response.windows.windows import (
     library_windows,
     trace_windows,
 )
+from studies.benchmarks import alignment_speed as bench
 from tests.oracles import alignment as twin
 from tests.response.alignment_samples import (
     ALL,

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynresp.bench import full_search_speed as bench
 from dynresp.bench.measure import Contender, median_seconds
-from dynresp.bench.window_error_twin import angle_between
 from dynresp.motion import rotations
 from dynresp.response.search.full_search import ERROR_FLOOR, FullSearchResult, search
 from dynresp.response.windows.windows import (
@@ -22,6 +20,8 @@ from dynresp.response.windows.windows import (
     trace_windows,
 )
 from dynresp.support.errors import MotionError, UnknownNameError, UsageError
+from studies.benchmarks import full_search_speed as bench
+from studies.benchmarks.window_error_twin import angle_between
 from tests.oracles import window_error
 from tests.oracles.alignment import Track
 from tests.response.alignment_samples import BODIES, placed, smooth_track

@@ -2,14 +2,12 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dynresp.bench import alignment_speed as align
-from dynresp.bench.full_search_speed import synthetic_track
-from dynresp.cli.bench import app
 from dynresp.response.alignment.alignment import Aligner, AlignmentConfig
 from dynresp.response.windows.windows import ReactionTrack, WindowErrorConfig
 from dynresp.support.errors import DynrespError
+from studies.benchmarks import alignment_speed as align
+from studies.benchmarks.full_search_speed import synthetic_track
 
 
 @pytest.fixture
@@ -47,13 +45,11 @@ def test_times_are_refused_where_the_sides_disagree(
         align.run(cases=small)
 
 
-def test_the_command_throws_balls(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_throws_balls(monkeypatch: pytest.MonkeyPatch) -> None:
     """On motion capture where there is some, else on what the product makes itself."""
     monkeypatch.setattr(align, "_ROUNDS", 1)
     monkeypatch.setattr(align, "HITS", 6)
-    result = CliRunner().invoke(app, ["align", "--seed", "3", "--json"])
-    assert result.exit_code == 0, result.output
-    content = json.loads(result.stdout)
+    content = align.run(3).to_json()
     assert content["name"] == "align"
     assert content["seed"] == 3
-    assert 0 < content["hits"] <= 6
+    assert 0 < content["hits"] <= 6  # type: ignore[operator]

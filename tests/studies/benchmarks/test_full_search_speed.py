@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from dynresp.bench import full_search_speed as oracle
 from dynresp.response.windows.windows import ReactionTrack, library_windows, make_windows
 from dynresp.support.errors import DynrespError
+from studies.benchmarks import full_search_speed as oracle
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynresp.bench import window_error_twin
 from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult, Contender, median_seconds
 from dynresp.motion import rotations
@@ -21,6 +20,7 @@ from dynresp.response.windows.windows import (
     trace_windows,
 )
 from dynresp.support.errors import DynrespError
+from studies.benchmarks import window_error_twin
 
 REACTIONS = 24
 """Reactions in the synthetic library."""

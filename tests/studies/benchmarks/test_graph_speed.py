@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.bench import graph_speed as bench
-from dynresp.bench.graph_database import database_of
-from dynresp.bench.numpy_pruning_twin import NumpyPruning
 from dynresp.locomotion.graph.graph_config import Coordinates, GraphConfig
 from dynresp.locomotion.graph.pruning import Jumps, find_jumps
 from dynresp.motion import rotations
 from dynresp.support.errors import DynrespError
+from studies.benchmarks import graph_speed as bench
+from studies.benchmarks.graph_database import database_of
+from studies.benchmarks.numpy_pruning_twin import NumpyPruning
 from tests.locomotion.graph.graph_samples import made_database
 
 

@@ -19,10 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dynresp.bench.graph_database import about, database_of, recorded_database
 from dynresp.bench.machine import describe_machine
 from dynresp.bench.measure import BenchResult, Contender, median_seconds
-from dynresp.bench.numpy_pruning_twin import Block, NumpyPruning
 from dynresp.locomotion.graph.frame_database import MotionDatabase
 from dynresp.locomotion.graph.graph_config import GraphConfig
 from dynresp.locomotion.graph.graph_file import load_graph, save_graph
@@ -34,6 +32,8 @@ from dynresp.locomotion.playing.composition import compose
 from dynresp.motion.character import Character, default_character
 from dynresp.support.arrays import BoolArray
 from dynresp.support.errors import DynrespError, MotionError
+from studies.benchmarks.graph_database import about, database_of, recorded_database
+from studies.benchmarks.numpy_pruning_twin import Block, NumpyPruning
 
 FRAMES = 12_879
 """Frames of the database."""

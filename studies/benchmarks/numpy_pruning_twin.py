@@ -1,4 +1,4 @@
-"""Pruning of a motion graph in vectorised NumPy: what `bench graph` compares with.
+"""Pruning of a motion graph in vectorised NumPy: what `graph_speed` compares with.
 
 Blocks of rows of the matrix, every pair that the first rule allows, the same distances and rules
 as `dynresp.locomotion.graph.pruning`, in float64. As there, a pair is compared once for its two

@@ -3,14 +3,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from dynresp.bench import prediction_speed as select
-from dynresp.cli import bench as commands
 from dynresp.response.prediction.classifier import Classifier, TrainedFor, TrainedOn
 from dynresp.response.prediction.classifier_file import save_classifier
 from dynresp.response.prediction.hit_features import FEATURE_NAMES
 from dynresp.support.errors import DynrespError
+from studies.benchmarks import prediction_speed as select
 
 
 @pytest.fixture(autouse=True)
@@ -71,9 +69,7 @@ def test_a_trained_classifier(tmp_path: Path) -> None:
     )
     path = tmp_path / "made.skops"
     save_classifier(path, classifier, subject.pipelines)
-    found = CliRunner().invoke(commands.app, ["predict", "--classifier", str(path), "--json"])
-    assert found.exit_code == 0, found.output
-    content = json.loads(found.stdout)
+    content = select.run(model=path).to_json()
     assert content["classes"] == 4
     assert content["features"] == 432
     assert content["exact_components"] == 8

@@ -2,8 +2,7 @@
 
 Written out from Zordan et al. 2007, section 5, with nothing but loops and scalar arithmetic in
 double precision. It shares no code with the fast path: the tests hold the kernel equal to it, and
-`dynresp bench search` measures how many times faster the kernel is. Because the command has to
-run from an installed package, where the tests are not, the twin lives here and the tests import it.
+`python -m studies full-search` measures how many times faster the kernel is.
 """
 
 from __future__ import annotations

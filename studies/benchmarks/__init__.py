@@ -1,0 +1,1 @@
+"""Benchmarks beside other ways to compute the same: NumPy, scikit-learn, readable twins."""
