@@ -44,11 +44,6 @@ Name: TypeAlias = str | Choice[str]
 """A name of a spec file."""
 
 
-def is_random(value: object) -> bool:
-    """Whether each hit draws its own value."""
-    return isinstance(value, Uniform | Choice)
-
-
 def draw(value: Any, rng: np.random.Generator) -> Any:
     """A value itself, or a draw from it.
 

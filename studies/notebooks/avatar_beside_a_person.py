@@ -33,7 +33,6 @@ from dynresp.avatar_runs.world_setup import blocks_of
 from dynresp.locomotion.graph.frame_distance import frame_distances, frame_features
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.playing.composition import compose
-from dynresp.locomotion.playing.gait_measures import ground_speeds, measure_gait
 from dynresp.locomotion.sketch.path_search import SearchGraph
 from dynresp.locomotion.sketch.sketch_control import follow_sketch
 from dynresp.locomotion.worlds.obstacles import Obstacle, World, body_clearances
@@ -43,6 +42,7 @@ from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import default_character
 from dynresp.motion.load import LoadOptions, load_motion
 from dynresp.motion.sources.motion_folders import find_motion_file, motion_folders
+from studies.graphs.gait_measures import ground_speeds, measure_gait
 
 study.style()
 character = default_character()

@@ -27,7 +27,6 @@ from dynresp.locomotion.graph.frame_distance import frame_distances, frame_featu
 from dynresp.locomotion.graph.graph_config import Coordinates
 from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.pruning import step_groups
-from dynresp.locomotion.playing.gait_measures import Gait
 from dynresp.motion.character import default_character
 from dynresp.motion.rotations import FloatArray, from_yaw
 from dynresp.motion.sources.motion_folders import motion_folders
@@ -35,6 +34,7 @@ from dynresp.support.errors import MissingMotionDataError
 from dynresp.view import body_shapes as shapes
 from dynresp.view import raster
 from dynresp.view.story import Block, MovingCapsule
+from studies.graphs.gait_measures import Gait
 
 LEFT, RIGHT = study.BLUE, study.ORANGE
 """Colours of the feet."""

@@ -38,9 +38,9 @@ from dynresp.locomotion.clusters.cluster_observations import observations
 from dynresp.locomotion.clusters.frame_clusters import Clusters
 from dynresp.locomotion.graph.random_walk import random_walk
 from dynresp.locomotion.playing.composition import compose
-from dynresp.locomotion.playing.gait_measures import measure_gait
 from dynresp.motion.character import default_character
 from dynresp.motion.feet.skating import stance_slides
+from studies.graphs.gait_measures import measure_gait
 
 study.style()
 character = default_character()

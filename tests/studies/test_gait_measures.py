@@ -3,13 +3,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynresp.locomotion.playing.gait_measures import ground_speeds, measure_gait
 from dynresp.motion.builtin import load_builtin
 from dynresp.motion.character import Character
 from dynresp.motion.feet import legs
 from dynresp.motion.load import load_motion
 from dynresp.motion.motion import FEET, Motion
 from dynresp.support.errors import UsageError
+from studies.graphs.gait_measures import ground_speeds, measure_gait
 
 FPS = 30.0
 STEP_M, APART_M, STEP_S = 0.5, 0.18, 0.6
