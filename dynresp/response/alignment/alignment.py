@@ -13,6 +13,7 @@ import functools
 import math
 from collections.abc import Sequence
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -86,22 +87,31 @@ class Aligner:
             raise MotionError("a quaternion of the reactions is not of unit length, w x y z")
         self._bodies = bodies.pop()
         clips = [one for one in made if one]
-        self._clips = np.concatenate([clip for clip, *_ in clips])
+        rows = np.concatenate([clip for clip, *_ in clips])
         ends = np.cumsum([len(clip) for clip, *_ in clips])
-        self._layouts = np.array(
+        layouts = np.array(
             [[end - len(clip), *layout] for end, (clip, *layout) in zip(ends, clips, strict=True)],
             np.int64,
         )
-        self._step = config.step_s * window.fps
-        self._exits, self._weights = _samples_and_weights(window, self._step, self._bodies)
+        rows.flags.writeable = layouts.flags.writeable = False
+        step = config.step_s * window.fps
+        exits, weights = _samples_and_weights(window, step, self._bodies)
         self._least = window.exit_frames[0] + window.window_frames
-        self._settings = (
-            config.sets_without_gain,
-            config.starts,
-            config.most_iterations if config.refine else 0,
-            LEAST_GAIN,
+        kernel = _kernel()
+        self._clips = kernel.Clips(rows, layouts)
+        self._weights = kernel.Weights(*weights)
+        self._sampling = kernel.Sampling(
+            window.window_frames, exits, step, config.sets_without_gain
         )
-        self._clips.flags.writeable = self._layouts.flags.writeable = False
+        most = config.most_iterations if config.refine else 0
+        self._descent = kernel.Descent(config.starts, most, LEAST_GAIN)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the state of a pickled aligner."""
+        self.__dict__ |= state
+        # Unpickled arrays can be written; the kernels' signatures know read-only ones.
+        for array in (*self._clips, *self._weights, self._sampling.exits):
+            array.flags.writeable = False
 
     def row(self, reaction: str) -> int:
         """Index of a reaction in `names`.
@@ -215,8 +225,8 @@ class Aligner:
         exits, entries = np.broadcast_arrays(
             np.asarray(exit_frames, np.float64), np.asarray(entry_frames, np.float64)
         )
-        layout = self._layouts[self.row(reaction)]
-        first, latest = int(layout[2]), int(layout[2] + layout[3])
+        row = self.row(reaction)
+        first, latest = self._entry_range(row)
         last = len(position) - self.window.window_frames
         for what, frames, low, high in (
             ("exit", exits, 0, last),
@@ -227,7 +237,7 @@ class Aligner:
                     f"{reaction!r}: {what} frames from {frames.min():g} to {frames.max():g} were "
                     f"given; expected {low} to {high}"
                 )
-        found = self._errors(position, quaternion, layout, exits.ravel(), entries.ravel())
+        found = self._errors(position, quaternion, row, exits.ravel(), entries.ravel())
         return found.reshape(exits.shape)
 
     def snap(
@@ -251,8 +261,8 @@ class Aligner:
             MotionError: As `align`, or the exit is outside the trace.
         """
         position, quaternion = self._trace(positions, quaternions, 3)
-        layout = self._layouts[self.row(alignment.reaction)]
-        _, _, earliest, room = layout.tolist()
+        row = self.row(alignment.reaction)
+        first, latest = self._entry_range(row)
         last = len(position) - self.window.window_frames
         # Bounds are whole frames, so the frames before and after an exit are within them, too.
         exits = sorted({math.floor(alignment.exit_frame), math.ceil(alignment.exit_frame)})
@@ -263,8 +273,8 @@ class Aligner:
             )
         ends = np.repeat(np.array(exits, float), len(_ENTRY_SHIFTS))
         shifted = alignment.entry_frame - alignment.exit_frame + ends
-        entries = np.clip(shifted + np.tile(_ENTRY_SHIFTS, len(exits)), earliest, earliest + room)
-        errors = self._errors(position, quaternion, layout, ends, entries)
+        entries = np.clip(shifted + np.tile(_ENTRY_SHIFTS, len(exits)), first, latest)
+        errors = self._errors(position, quaternion, row, ends, entries)
         best = int(errors.argmin())
         return dataclasses.replace(
             alignment,
@@ -273,6 +283,11 @@ class Aligner:
             entry_frame=float(entries[best]),
             evaluations=alignment.evaluations + len(ends),
         )
+
+    def _entry_range(self, row: int) -> tuple[int, int]:
+        """First and last entry of a reaction [frames]."""
+        layout, kernel = self._clips.layouts[row], _kernel()
+        return int(layout[kernel.FIRST]), int(layout[kernel.FIRST] + layout[kernel.LATER])
 
     # -- memory layout and checks ---------------------------------------------------------------
 
@@ -319,12 +334,9 @@ class Aligner:
             quaternion,
             rows,
             self._clips,
-            self._layouts,
-            *self._weights,
-            self.window.window_frames,
-            self._exits,
-            self._step,
-            *self._settings,
+            self._weights,
+            self._sampling,
+            self._descent,
             found,
         )
         if invalid >= 0:
@@ -335,16 +347,16 @@ class Aligner:
         self,
         position: FloatArray,
         quaternion: FloatArray,
-        layout: npt.NDArray[np.int64],
+        row: int,
         exits: FloatArray,
         entries: FloatArray,
     ) -> FloatArray:
         """Call the kernel for pairs that are within bounds."""
         found = np.empty(len(exits))
-        frames = self.window.window_frames
         if len(exits) and not _kernel().errors_kernel(
-            position, quaternion, self._clips, layout, *self._weights, frames, exits, entries, found
-        ):
+            position, quaternion, row, self._clips, self._weights, self.window.window_frames,
+            exits, entries, found,
+        ):  # fmt: skip
             self._refuse(position[None], quaternion[None])
         return found
 

@@ -98,23 +98,25 @@ def test_mismatches_of_pelvises_that_lie_or_are_upside_down() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_slopes_are_those_of_the_twin(seed: int) -> None:
     from dynresp.response.alignment import alignment_kernel as kernel
+    from dynresp.response.alignment import mismatch_kernel as mismatch
 
     trace, clip = smooth_track(seed), smooth_track(seed + 50, 24)
     aligner = Aligner([ReactionTrack("it", *clip)], WINDOW)
     assert kernel.LANES == LANES
-    row = (FRAMES + 1) * BODIES + kernel.LANES
-    rows = np.empty(kernel.ROWS * row, np.float32)
-    assert kernel.lay_out(*trace, FRAMES, rows)
-    _, clip_row, _, latest = aligner._layouts[0].tolist()
+    length = (FRAMES + 1) * BODIES + kernel.LANES
+    rows = np.empty(mismatch.ROWS * length, np.float32)
+    assert mismatch.lay_out(*trace, FRAMES, rows)
+    track = mismatch.Track(rows, length, BODIES)
+    layout = aligner._clips.layouts[0]
+    reaction = mismatch.Track(aligner._clips.rows, layout[kernel.LENGTH], BODIES)
+    latest = int(layout[kernel.LATER])
     rng = np.random.default_rng(seed)
-    slope = njit(lambda *arguments: kernel._slope(*arguments))
+    slope = njit(lambda *arguments: mismatch.slopes_between(*arguments))
     for _ in range(4):
         # Between whole frames, where the slope has a step.
         at = rng.integers(2, 12) + rng.uniform(0.1, 0.9)
         entry = rng.integers(0, 19) + rng.uniform(0.1, 0.9)
-        found = slope(
-            rows, row, at, 12.0, aligner._clips, clip_row, entry, latest, BODIES, *aligner._weights
-        )
+        found = slope(track, at, 12.0, reaction, entry, latest, aligner._weights)
         step = 1e-4
         sides = [
             [twin.error_between(trace, clip, at + s, entry + m, WINDOW) for s, m in pair]
