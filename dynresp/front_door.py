@@ -114,20 +114,24 @@ class ExperimentResult(Sequence[HitResponse]):
         """The responses in order."""
         return iter(self.responses)
 
-    def save(self, folder: Path | str, progress: Progress = no_progress) -> dict[str, Any]:
+    def save(
+        self, folder: Path | str, progress: Progress = no_progress, *, overwrite: bool = False
+    ) -> dict[str, Any]:
         """Write the result folder, as `dynresp run` does.
 
         Args:
             folder: Where to; made if it is missing.
             progress: Called with the stage, how many steps are done, and of how many.
+            overwrite: Whether files that no earlier result names as its own may be replaced.
 
         Returns:
             The content of `result.json`; of several hits, of `summary.json`.
 
         Raises:
+            UsageError: Somebody else's file would be replaced, or a file that was read.
             DynrespError: That file cannot be written.
         """
-        return write_results(self._run, self._results, Path(folder), progress)
+        return write_results(self._run, self._results, Path(folder), progress, overwrite=overwrite)
 
 
 def run(
@@ -168,6 +172,7 @@ def run(
             _hit=answer.hit,
             _record=record,
             _responder=loaded.responder,
+            _inputs=loaded.inputs,
         )
         for answer in results
     )

@@ -18,6 +18,8 @@ import dynresp.front_door
 import dynresp.motion.character
 import dynresp.physics.impacts
 import dynresp.response.runtime.crowd
+from dynresp.motion.character import default_character
+from dynresp.motion.export import write_npz
 
 BALL = dynresp.Ball(time=1.5, mass=6, speed=8, from_deg=180)
 
@@ -73,6 +75,21 @@ def test_type_checkers_see_the_same_names() -> None:
         for alias in node.names
     }
     assert imported == {(home, name) for name, home in dynresp._HOMES.items()}
+
+
+def test_saving_keeps_files_of_others(tmp_path: Path) -> None:
+    walk = dynresp.load_motion("builtin:walk")
+    write_npz(walk, tmp_path / "motion.npz", default_character())
+    before = (tmp_path / "motion.npz").read_bytes()
+    ball = dynresp.Ball(time=0.8, mass=6, speed=8, from_deg=180)
+    response = dynresp.hit(tmp_path / "motion.npz", ball, library="builtin")
+    for write in (["motion.npz"], ["motion.bvh"]):
+        (tmp_path / "motion.bvh").write_text("mine")
+        with pytest.raises(dynresp.UsageError, match="another folder"):
+            response.save(tmp_path, write=write, overwrite=write == ["motion.npz"])
+        assert (tmp_path / "motion.npz").read_bytes() == before
+        assert (tmp_path / "motion.bvh").read_text() == "mine"
+        assert not (tmp_path / "result.json").exists()
 
 
 def test_an_unknown_name() -> None:

@@ -18,7 +18,7 @@ from dynresp.motion.character import Character
 from dynresp.motion.feet.skating import stance_slides
 from dynresp.motion.motion import Motion
 from dynresp.response.response_quality import joint_speed_steps
-from dynresp.results.result_folder import PLAN, RESULT, WRITTEN, clear_response
+from dynresp.results.result_folder import PLAN, RESULT, WRITTEN, claim, clear
 from dynresp.results.result_json import versions, write_json
 from dynresp.results.story_files import Writer, story_writers, write_files
 from dynresp.support.progress import Progress, no_progress
@@ -84,24 +84,33 @@ class AvatarRun:
         return cls(graph, character, motion=motion, jumps_s=jumps_s, sliding=sliding, **rest)
 
     def save(
-        self, folder: Path | str, progress: Progress = no_progress, video: bool = True
+        self,
+        folder: Path | str,
+        progress: Progress = no_progress,
+        video: bool = True,
+        *,
+        overwrite: bool = False,
     ) -> dict[str, Any]:
         """Write the result folder.
 
         Args:
-            folder: Where to; made if it is missing. Files that an earlier run wrote there, and
+            folder: Where to; made if it is missing. Files that an earlier result wrote there, and
                 this one does not, are removed.
             progress: Called with the stage, how many steps are done, and of how many.
             video: Whether a video is drawn.
+            overwrite: Whether files that no earlier result names as its own may be replaced.
 
         Returns:
             The content of `result.json`. Its `files` says of each file whether it was written, and
             if not, why.
 
         Raises:
+            UsageError: A file of somebody else would be replaced; nothing was written.
             DynrespError: `result.json` cannot be written.
         """
         folder = Path(folder)
+        names = [name for name in FILES if video or name != VIDEO] + list(self.writers)
+        own = claim(folder, RESULT, names, overwrite=overwrite)
         story = self._story()
 
         def plan(path: Path) -> None:
@@ -115,11 +124,9 @@ class AvatarRun:
             PLAN: plan,
             **self.writers,
         }
-        names = [name for name in FILES if video or name != VIDEO]
-        names += list(self.writers)
         files = write_files(folder, names, writers, progress)
         written = [name for name, what in files.items() if what == WRITTEN]
-        not_removed = clear_response(folder, [RESULT, *written])
+        not_removed = clear(folder, own - {RESULT, *written})
         files |= {name: what for name, what in not_removed.items() if name not in files}
         content = {
             "title": self.title,

@@ -12,6 +12,7 @@ from dynresp import __version__
 from dynresp.cli import bench, demo, evaluate, generate, graph, motions, reactions, run, train
 from dynresp.cli.interruption import INTERRUPTED
 from dynresp.support.errors import DynrespError
+from dynresp.support.inputs import inputs_noted
 
 
 class Commands(TyperGroup):
@@ -20,7 +21,8 @@ class Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
         try:
-            return super().invoke(ctx)
+            with inputs_noted():
+                return super().invoke(ctx)
         except DynrespError as error:
             typer.echo(f"dynresp: {error}", err=True)
             raise typer.Exit(error.exit_code) from None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dynresp.cli.progress_bar import progress
-from dynresp.cli.run import exit_if_failed, report_unwritten
+from dynresp.cli.run import check_folder, exit_if_failed, report_unwritten
 
 if TYPE_CHECKING:
     from dynresp.avatar_runs.avatar_run import AvatarRun
@@ -22,10 +22,31 @@ Video = Annotated[bool, typer.Option("--video/--no-video", help="Whether to draw
 USUAL_FPS = 30.0
 
 
+def check_results(out: Path, video: bool, overwrite: bool, more: Sequence[str] = ()) -> None:
+    """Check, before any work, that the results of an avatar can be written to a folder.
+
+    Args:
+        out: The folder.
+        video: Whether a video is drawn.
+        overwrite: Whether files that no earlier result names as its own may be replaced.
+        more: Further files.
+
+    Raises:
+        UsageError: They cannot.
+    """
+    from dynresp.avatar_runs.avatar_run import FILES, VIDEO
+    from dynresp.results.result_folder import RESULT, check_claim
+
+    check_folder(out)
+    names = [name for name in FILES if video or name != VIDEO]
+    check_claim(out, [RESULT, *names, *more], overwrite=overwrite)
+
+
 def finish(
     out: Path,
     run: AvatarRun,
     video: bool,
+    overwrite: bool,
     as_json: bool,
     more: dict[str, Any] | None = None,
     lines: Sequence[str] = (),
@@ -36,6 +57,7 @@ def finish(
         out: Folder for the results.
         run: What the avatar did.
         video: Whether a video is drawn.
+        overwrite: Whether files that no earlier result names as its own may be replaced.
         as_json: Whether one JSON object is printed instead of text.
         more: Also printed in that object, but not written: what differs from run to run.
         lines: Also printed in the text.
@@ -46,7 +68,7 @@ def finish(
     from dynresp.results.result_json import to_json
 
     with progress() as report:
-        content = run.save(out, report, video)
+        content = run.save(out, report, video, overwrite=overwrite)
     report_unwritten(content["files"])
     typer.echo(to_json({**content, **(more or {})}) if as_json else run_text(content, out, lines))
     if not run.arrived:

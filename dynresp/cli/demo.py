@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from dynresp.cli.options import ChosenBudget, Json, Motions, Seed
+from dynresp.cli.options import ChosenBudget, Json, Motions, Overwrite, Seed
 from dynresp.cli.run import choice_of, run_file
 
 EXAMPLE = "walk_ball.toml"
@@ -25,6 +25,7 @@ def demo(
     video: Annotated[
         bool, typer.Option("--video", help="Also draw video.mp4, which takes about 10 s more.")
     ] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Run an example: a heavy ball hits a walking person.
 
@@ -35,4 +36,5 @@ def demo(
 
     file = example_specs("experiments") / EXAMPLE
     choice = choice_of(budget, None)
-    run_file(file, out, motions, seed, as_json, choice, without=() if video else ("video.mp4",))
+    without = () if video else ("video.mp4",)
+    run_file(file, out, motions, seed, as_json, choice, without, overwrite)

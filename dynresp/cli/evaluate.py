@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dynresp.cli.options import Json
+from dynresp.cli.options import Json, Overwrite
 from dynresp.cli.progress_bar import progress
 
 
@@ -26,6 +26,7 @@ def evaluate(
             help="Folder for evaluation.json, per_strategy.csv and confusion.png.",
         ),
     ] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Measure how well a classifier chooses, beside simple baselines.
@@ -38,36 +39,40 @@ def evaluate(
 
     require("pyarrow", "sklearn")
     if out is not None:
+        from dynresp.learning.evaluation_files import FILES
+        from dynresp.results.result_folder import check_claim
+
         check_folder(out)
+        check_claim(out, FILES, overwrite=overwrite)
     with progress() as plain:
         report = with_elapsed(plain)
         report("reading", 0, 1)
         from dynresp.datasets.dataset_reader import load_dataset
         from dynresp.learning import evaluation
         from dynresp.response.prediction.classifier_file import load_classifier
-        from dynresp.results.result_folder import WRITTEN
+        from dynresp.results.result_folder import EVALUATION, WRITTEN
         from dynresp.results.result_json import to_json
 
-        files: dict[str, str] = {}
         content = evaluation.evaluate(load_classifier(model), load_dataset(dataset), report)
         if out is not None:
             report("writing", 0, 1)
             from dynresp.learning.evaluation_files import write_report
 
-            files = write_report(out, content)
+            content = write_report(out, content, overwrite=overwrite)
     if content["differing_settings"]:
         typer.echo(
             "dynresp: the dataset was made with other settings than the training data: "
             f"{', '.join(content['differing_settings'])}",
             err=True,
         )
+    files: dict[str, str] = content.get("files", {})
     report_unwritten(files)
     if as_json:
         typer.echo(to_json(content))
     else:
         typer.echo(_text(content))
         if out is not None:
-            written = [name for name, what in files.items() if what == WRITTEN]
+            written = [EVALUATION, *(name for name, what in files.items() if what == WRITTEN)]
             typer.echo(f"  written    {out}: {', '.join(written)}")
     exit_if_failed(files)
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dynresp.cli.options import Json, Motions, Seed
+from dynresp.cli.options import Json, Motions, OverwriteFiles, Seed
 from dynresp.cli.progress_bar import progress
 from dynresp.support.progress import Progress
 
@@ -48,6 +48,7 @@ def generate(
         typer.Option("--shard-size", min=1, max=100_000, help="Samples per file; by default 500."),
     ] = None,
     motions: Motions = None,
+    overwrite: OverwriteFiles = False,
     as_json: Json = False,
 ) -> None:
     """Make training data: draw random hits, simulate them, find the best reaction to each.
@@ -78,6 +79,7 @@ def generate(
             shard_size,
             _with_rate(report),
             _warn,
+            overwrite=overwrite,
         )
     content = summary.to_json()
     typer.echo(json.dumps(content, indent=2) if as_json else _text(content))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from dynresp.cli.options import Json, Motions
+from dynresp.cli.options import Json, Motions, OverwriteFile
 from dynresp.cli.progress_bar import progress
 
 # The usual spec, and the one to use if its motions are not on this machine.
@@ -25,6 +25,7 @@ def build(
         ),
     ] = None,
     motions: Motions = None,
+    overwrite: OverwriteFile = False,
     as_json: Json = False,
 ) -> None:
     """Build a motion graph, and say how many jumps each pruning rule leaves."""
@@ -37,7 +38,7 @@ def build(
     from dynresp.motion.sources.motion_folders import motion_folders
     from dynresp.support.errors import MissingMotionDataError
 
-    check_file(out)
+    check_file(out, overwrite, _is_graph)
     folders = motion_folders(motions)
     character = default_character()
     with progress() as report:
@@ -54,6 +55,19 @@ def build(
             )
             path = find_graph_spec(_INSTEAD)
             graph = build_graph(read_graph_spec(path), folders, path.parent, character, report)
+        # Once more: its motions are known only now.
+        check_file(out, overwrite, _is_graph)
         report(f"writing {out}", 0, 1)
         save_graph(graph, out)
     typer.echo(graph_text(graph, out, as_json))
+
+
+def _is_graph(file: Path) -> bool:
+    from dynresp.locomotion.graph.graph_file import load_graph
+    from dynresp.support.errors import DynrespError
+
+    try:
+        load_graph(file)
+    except DynrespError:
+        return False
+    return True

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, finish
+from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, check_results, finish
 from dynresp.cli.graph_info import Graph
-from dynresp.cli.options import Json, Seed
+from dynresp.cli.options import Json, Overwrite, Seed
 from dynresp.cli.progress_bar import progress
-from dynresp.cli.run import check_folder
 
 if TYPE_CHECKING:
     from dynresp.motion.rotations import FloatArray
@@ -52,6 +51,7 @@ def sketch(
     seed: Seed = None,
     fps: Fps = USUAL_FPS,
     video: Video = True,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Walk along a path or to a goal, around obstacles.
@@ -71,7 +71,7 @@ def sketch(
     start_m = None if start is None else read_point(start, "--start")
     loaded = load_graph(graph)
     boxes = None if world is None else read_world(world)
-    check_folder(out)
+    check_results(out, video, overwrite)
     with progress() as report:
         run = sketch_run(
             loaded, default_character(), path=corners, goal=goal_m, start=start_m, world=boxes,
@@ -82,7 +82,7 @@ def sketch(
     if off is not None and off > _MAX_OFF_M:
         why = "; obstacles are in the way" if boxes is not None or maze else ""
         typer.echo(f"dynresp: the walk misses a corner of the path by {off:.1f} m{why}", err=True)
-    finish(out, run, video, as_json)
+    finish(out, run, video, overwrite, as_json)
 
 
 def read_points(text: str | None, file: Path | None) -> FloatArray | None:
@@ -114,9 +114,10 @@ _MAX_CORNERS = 10_000
 def _lines(file: Path) -> list[str]:
     """The lines of a small file of text."""
     from dynresp.support.errors import UsageError
+    from dynresp.support.inputs import open_input
 
     try:
-        with file.open("rb") as stream:
+        with open_input(file) as stream:
             data = stream.read(_MAX_BYTES + 1)
     except OSError as error:
         raise UsageError(

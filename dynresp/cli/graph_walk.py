@@ -6,10 +6,9 @@ from typing import Annotated
 
 import typer
 
-from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, finish
+from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, check_results, finish
 from dynresp.cli.graph_info import Graph
-from dynresp.cli.options import Json, Seed
-from dynresp.cli.run import check_folder
+from dynresp.cli.options import Json, Overwrite, Seed
 
 
 def walk(
@@ -21,6 +20,7 @@ def walk(
     seed: Seed = None,
     fps: Fps = USUAL_FPS,
     video: Video = True,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Walk by chance, in the world of the graph.
@@ -36,7 +36,13 @@ def walk(
     from dynresp.motion.character import default_character
 
     loaded = load_graph(graph)
-    check_folder(out)
+    check_results(out, video, overwrite)
     run = chance_run(loaded, default_character(), seconds, seed or 0, fps)
     name = graph.name.encode(errors="replace").decode()
-    finish(out, dataclasses.replace(run, title=f"{run.title} through {name}"), video, as_json)
+    finish(
+        out,
+        dataclasses.replace(run, title=f"{run.title} through {name}"),
+        video,
+        overwrite,
+        as_json,
+    )

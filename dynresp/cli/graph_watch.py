@@ -13,11 +13,10 @@ from typing import Annotated, Any
 
 import typer
 
-from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, finish
+from dynresp.cli.avatar_options import USUAL_FPS, Fps, Out, Video, check_results, finish
 from dynresp.cli.graph_info import Graph
-from dynresp.cli.options import Json, Seed
+from dynresp.cli.options import Json, Overwrite, Seed
 from dynresp.cli.progress_bar import progress
-from dynresp.cli.run import check_folder
 
 # Time to step out of a camera's picture, and the longest time to follow [s].
 _STEP_OUT_S = 5.0
@@ -57,6 +56,7 @@ def watch(
     seed: Seed = None,
     fps: Fps = USUAL_FPS,
     video: Video = True,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Follow a person in a video or before a camera: the avatar does what the person does.
@@ -72,10 +72,11 @@ def watch(
     from dynresp.avatar_runs.visible_cluster_file import VideoModel
     from dynresp.locomotion.graph.graph_file import load_graph
     from dynresp.motion.character import default_character
+    from dynresp.results.result_folder import WATCHING
 
     loaded = load_graph(graph)
     check_watchable(loaded)
-    check_folder(out)
+    check_results(out, video, overwrite, [WATCHING])
     opened, live = open_source(source)
     character = default_character()
     remarks: list[str] = []
@@ -105,7 +106,7 @@ def watch(
     speed = (
         f"{pace.choices} choices, {pace.choices_per_s:.0f} per second of computing (10 are needed)"
     )
-    finish(out, run, video, as_json, {"pace": dataclasses.asdict(pace)}, [speed])
+    finish(out, run, video, overwrite, as_json, {"pace": dataclasses.asdict(pace)}, [speed])
 
 
 class Stop:

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from dynresp.cli import motion_options
-from dynresp.cli.options import Json, Motions
+from dynresp.cli.options import Json, Motions, OverwriteFiles
+from dynresp.cli.run import check_folder, check_new
 
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")]
 
@@ -33,15 +34,22 @@ def import_motions(
     asf: motion_options.Asf = None,
     trim_t_pose: motion_options.TrimTPose = False,
     uneven_floor: motion_options.UnevenFloor = False,
+    overwrite: OverwriteFiles = False,
     as_json: Json = False,
 ) -> None:
     """Retarget motion files to the character, and write each as DIR/NAME.npz."""
     from dynresp.motion.character import default_character
     from dynresp.motion.export import write_npz
     from dynresp.motion.load import load_motion
+    from dynresp.support.inputs import note_input
 
     options = motion_options.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
     targets = _targets(files, out)
+    check_folder(out)
+    for file in files:
+        # Each is an input already, although the later ones are read later.
+        note_input(file)
+    check_new(targets, overwrite)
     rows = []
     for file, target in zip(files, targets, strict=True):
         typer.echo(f"importing {file} ...", err=True)
@@ -67,6 +75,7 @@ def export(
     trim_t_pose: motion_options.TrimTPose = False,
     uneven_floor: motion_options.UnevenFloor = False,
     motions: Motions = None,
+    overwrite: OverwriteFiles = False,
     as_json: Json = False,
 ) -> None:
     """Write a motion, as retargeted to the character, for other programs."""
@@ -77,6 +86,8 @@ def export(
     loaded, file = motion_options.load(motion, motions, options)
     stem = motion.partition(":")[2] if file is None else file.stem
     target = out / f"{stem}.{file_format.value}"
+    check_folder(out)
+    check_new([target], overwrite)
     write = write_bvh if file_format is Format.bvh else write_npz
     write(loaded, target, default_character())
     if as_json:

@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dynresp.cli import motion_options
-from dynresp.cli.options import Json, Motions
+from dynresp.cli.options import Json, Motions, OverwriteFiles
+from dynresp.cli.run import check_folder, check_new
 
 if TYPE_CHECKING:
     from dynresp.motion.motion import Motion
+
+
+PICTURES = ("recording.html", "filmstrip.png")
 
 
 def show(
@@ -28,6 +32,7 @@ def show(
     trim_t_pose: motion_options.TrimTPose = False,
     uneven_floor: motion_options.UnevenFloor = False,
     motions: Motions = None,
+    overwrite: OverwriteFiles = False,
     as_json: Json = False,
 ) -> None:
     """Show facts about a motion, as retargeted to the character.
@@ -39,6 +44,9 @@ def show(
 
     options = motion_options.options(unit, up, fps, asf, trim_t_pose, uneven_floor)
     loaded, file = motion_options.load(motion, motions, options)
+    if out is not None:
+        check_folder(out)
+        check_new([out / name for name in PICTURES], overwrite)
     found = motion_facts(loaded, file, options)
     if out is not None:
         _draw(loaded, out)
@@ -61,9 +69,10 @@ def _draw(motion: Motion, out: Path) -> None:
         title=motion.name,
         subtitle=f"{motion.duration:.1f} s",
     )
-    typer.echo("writing recording.html and filmstrip.png ...", err=True)
-    write_recording(story, out / "recording.html")
-    write_filmstrip(story, out / "filmstrip.png")
+    recording, filmstrip = PICTURES
+    typer.echo(f"writing {recording} and {filmstrip} ...", err=True)
+    write_recording(story, out / recording)
+    write_filmstrip(story, out / filmstrip)
 
 
 def _lines(found: dict[str, Any]) -> list[str]:

@@ -30,6 +30,21 @@ Json: TypeAlias = Annotated[
     typer.Option("--json", help="Print one JSON object instead of text."),
 ]
 
+Overwrite: TypeAlias = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite",
+        help="Also replace files that no earlier result in the folder names as its own.",
+    ),
+]
+OverwriteFile: TypeAlias = Annotated[
+    bool,
+    typer.Option("--overwrite", help="Replace what is there, even if it is something else."),
+]
+OverwriteFiles: TypeAlias = Annotated[
+    bool, typer.Option("--overwrite", help="Replace files that exist.")
+]
+
 
 class Budget(StrEnum):
     """How much time the choice of a reaction may take."""

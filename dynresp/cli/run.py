@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from dynresp.cli.options import Budget, ChosenBudget, ChosenClassifier, Json, Motions, Seed
+from dynresp.cli.options import (
+    Budget,
+    ChosenBudget,
+    ChosenClassifier,
+    Json,
+    Motions,
+    Overwrite,
+    Seed,
+)
 from dynresp.cli.progress_bar import progress
 
 
@@ -22,6 +30,7 @@ def run(
     seed: Seed = None,
     budget: ChosenBudget = None,
     classifier: ChosenClassifier = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Run an experiment file: hit the character, and write how it reacts.
@@ -30,7 +39,8 @@ def run(
     if this machine can render, video.mp4. Several hits: summary.json, table.csv, and those files
     for some of the hits.
     """
-    run_file(experiment, out, motions, seed, as_json, choice_of(budget, classifier))
+    choice = choice_of(budget, classifier)
+    run_file(experiment, out, motions, seed, as_json, choice, overwrite=overwrite)
 
 
 def choice_of(budget: Budget | None, classifier: Path | None) -> dict[str, str]:
@@ -47,6 +57,7 @@ def run_file(
     as_json: bool,
     choice: dict[str, str],
     without: Collection[str] = (),
+    overwrite: bool = False,
 ) -> None:
     """Run an experiment file and print its results.
 
@@ -58,6 +69,7 @@ def run_file(
         as_json: Print `result.json` or `summary.json` instead of text.
         choice: Keys of `[choice]` that replace the file's own.
         without: Files that are not written, even if the experiment file asks for them.
+        overwrite: Whether files that no earlier result names as its own may be replaced.
 
     Raises:
         typer.Exit: With code 1, if every simulation diverged or a file could not be written. A
@@ -77,7 +89,7 @@ def run_file(
         from dynresp.experiments.runner import prepare_run, run_experiment
 
         loaded = prepare_run(file, experiment.parent, motions, seed, choice=choice)
-        content = run_experiment(loaded, out, report)
+        content = run_experiment(loaded, out, report, overwrite=overwrite)
     for remark in (substitutes_text(content), choice_text(content)):
         if remark:
             typer.echo(f"dynresp: {remark}", err=True)
@@ -143,13 +155,50 @@ def check_folder(out: Path) -> None:
         )
 
 
-def check_file(out: Path) -> None:
-    """Check, before any work, that a file can be written."""
+def check_file(out: Path, overwrite: bool, is_ours: Callable[[Path], bool]) -> None:
+    """Check, before any work, that a file can be written.
+
+    Args:
+        out: The file.
+        overwrite: Whether any file may be replaced but one that was read.
+        is_ours: Says of a file that exists whether the same command has written it.
+
+    Raises:
+        UsageError: It cannot.
+    """
     from dynresp.support.errors import UsageError
+    from dynresp.support.inputs import noted_inputs
 
     if not out.name or out.is_dir():
         raise UsageError(f"--out: expected a file, got {str(out)!r}, which is a folder")
     check_folder(out.absolute().parent)
+    if out.resolve() in noted_inputs():
+        raise UsageError(f"--out: {str(out)!r} is read by this command; choose another name")
+    if out.exists() and not overwrite and not is_ours(out):
+        raise UsageError(
+            f"--out: {str(out)!r} exists and is something else; choose another name, or allow to "
+            "replace it (--overwrite)"
+        )
+
+
+def check_new(files: Sequence[Path], overwrite: bool) -> None:
+    """Check, before any work, that files can be written without replacing any.
+
+    Raises:
+        UsageError: One was read, or exists and may not be replaced.
+    """
+    from dynresp.support.errors import UsageError
+    from dynresp.support.inputs import noted_inputs
+
+    for file in files:
+        if file.resolve() in noted_inputs():
+            raise UsageError(
+                f"{file} is read by this command and would be replaced; choose another folder"
+            )
+        if file.exists() and not overwrite:
+            raise UsageError(
+                f"{file} exists; choose another folder, or allow to replace it (--overwrite)"
+            )
 
 
 def _all_diverged(content: dict[str, Any]) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynresp.cli.options import Json, Seed
+from dynresp.cli.options import Json, OverwriteFile, Seed
 from dynresp.cli.progress_bar import progress
 from dynresp.support.progress import Progress
 
@@ -86,6 +86,7 @@ def train(
             "precision. A smaller file that can be passed on.",
         ),
     ] = False,
+    overwrite: OverwriteFile = False,
     seed: Seed = None,
     as_json: Json = False,
 ) -> None:
@@ -93,7 +94,7 @@ def train(
 
     Then measure it on samples that were not trained on.
     """
-    from dynresp.cli.run import check_folder
+    from dynresp.cli.run import check_file
     from dynresp.support.errors import UsageError
     from dynresp.support.extras import require
 
@@ -101,7 +102,7 @@ def train(
     if out is not None and (out.suffix != ".skops" or out.is_dir()):
         raise UsageError(f"--out: {str(out)!r}: expected a file name that ends in .skops")
     if out is not None:
-        check_folder(out.parent)
+        check_file(out, overwrite, _is_classifier)
     with progress() as plain:
         report = with_elapsed(plain)
         report("reading", 0, 1)
@@ -121,7 +122,7 @@ def train(
         )
         data = load_dataset(dataset)
         file = out or classifier_file(data.facts.library_identity)
-        check_folder(file.parent)
+        check_file(file, overwrite, _is_classifier)
         trained = learning.train(data, config, report)
         report("writing", 0, 1)
         if compiled_only:
@@ -133,6 +134,17 @@ def train(
         typer.echo(json.dumps(_content(trained.classifier, file), indent=2))
     else:
         typer.echo(_text(trained.classifier, file))
+
+
+def _is_classifier(file: Path) -> bool:
+    from dynresp.response.prediction.classifier_file import load_classifier
+    from dynresp.support.errors import DynrespError
+
+    try:
+        load_classifier(file)
+    except DynrespError:
+        return False
+    return True
 
 
 def with_elapsed(report: Progress, clock: Callable[[], float] = time.monotonic) -> Progress:

@@ -98,6 +98,8 @@ def generate(
     shard_size: int | None = None,
     progress: Progress | None = None,
     loaded: Callable[[Mapping[str, Any]], None] | None = None,
+    *,
+    overwrite: bool = False,
 ) -> Summary:
     """Make a dataset, or the missing part of it.
 
@@ -113,6 +115,7 @@ def generate(
         shard_size: Samples of a shard; by default what the folder has, else `SHARD_SIZE`.
         progress: Called with the stage, samples done, and samples in all.
         loaded: Called with the manifest before any sample is made.
+        overwrite: Whether a manifest and shards may be replaced that no dataset of ours names.
 
     Raises:
         UsageError: The folder holds another dataset or more samples than the spec, or cannot be
@@ -132,6 +135,8 @@ def generate(
         worker = SampleWorker(spec, spec_folder.resolve(), motions)
         manifest = worker.manifest(_shard_size(out, shard_size, worker))
         there = _checked(out, manifest)
+        if there is None and not overwrite:
+            _refuse_foreign(out)
         if loaded is not None:
             loaded(manifest)
         facts = parse_facts(manifest)
@@ -304,6 +309,22 @@ def _checked(out: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
     if there["count"] > manifest["count"]:
         raise _too_few_error(out, there["count"], manifest["count"])
     return there
+
+
+def _refuse_foreign(out: Path) -> None:
+    """Refuse files that a dataset would replace, where nothing says that they are a dataset's.
+
+    A damaged manifest beside shards of ours is ours, too: it is made again.
+    """
+    foreign = [path.name for _, path in sorted(shard_files(out).items())]
+    if (out / MANIFEST).exists():
+        foreign.insert(0, MANIFEST)
+    if foreign and not stated_ranges(out):
+        more = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
+        raise UsageError(
+            f"{out} holds {', '.join(foreign[:3])}{more}, which dynresp has not written; choose "
+            "another folder, or allow to replace files (--overwrite, in Python overwrite=True)"
+        )
 
 
 @contextmanager

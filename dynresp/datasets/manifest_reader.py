@@ -15,6 +15,7 @@ from dynresp.datasets.manifest import FORMAT, MANIFEST, identity_of
 from dynresp.datasets.shard_schema import MAX_WIDTH, SCHEMA_VERSION, Column, Columns, columns
 from dynresp.datasets.shards import ShardError
 from dynresp.support.errors import DynrespError, UsageError
+from dynresp.support.inputs import open_input
 
 MAX_SHARD_SIZE = 100_000
 """Most samples of one shard."""
@@ -133,7 +134,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     path = folder / MANIFEST
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             data = file.read(_MAX_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
         raise UsageError(

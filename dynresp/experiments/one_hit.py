@@ -30,6 +30,7 @@ from dynresp.response.response_settings import settings_record
 from dynresp.results.result_folder import Artefact
 from dynresp.results.result_json import versions
 from dynresp.support.errors import SimulationError, UnknownNameError, UsageError
+from dynresp.support.inputs import inputs_noted
 from dynresp.support.progress import Progress, no_progress
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ class HitResponse:
     _hit: Hit
     _record: dict[str, Any]
     _responder: Responder
+    _inputs: frozenset[Path] = frozenset()
 
     @property
     def poses(self) -> FloatArray:
@@ -98,22 +100,26 @@ class HitResponse:
         folder: Path | str,
         write: Sequence[str] | None = None,
         progress: Progress = no_progress,
+        overwrite: bool = False,
     ) -> dict[str, Any]:
         """Write the result folder: motion, recording, pictures, video and `result.json`.
 
         These are the files of `dynresp run`. What an earlier result left in the folder is removed.
+        Other files stay, and the file of the base motion is never written.
 
         Args:
             folder: Where to; made if it is missing.
             write: Names of the files to write, such as "motion.bvh" and "filmstrip.png"; all by
                 default. The video takes longest.
             progress: Called with the stage, how many steps are done, and of how many.
+            overwrite: Whether files that no earlier result names as its own may be replaced.
 
         Returns:
             The content of `result.json`; `files` says what was written, and why the rest was not.
 
         Raises:
-            UsageError: `write` names a file that there is not.
+            UsageError: `write` names a file that there is not, or somebody else's file would be
+                replaced; nothing was written.
             DynrespError: `result.json` cannot be written.
         """
         known = get_args(Artefact)
@@ -132,6 +138,8 @@ class HitResponse:
             output,
             self._responder,
             progress,
+            inputs=self._inputs,
+            overwrite=overwrite,
         )
 
     def show(self) -> Path:
@@ -203,11 +211,13 @@ def hit(
     )
     fps = responder.config.physics.fps
     base: dict[str, Any] = {}
+    inputs: set[Path] = set()
     if isinstance(motion, Motion):
         base["motion"] = motion.name
     else:
         base["motion"] = str(motion)
-        motion, _ = load_named_motion(str(motion), motions, responder.character)
+        with inputs_noted() as inputs:
+            motion, _ = load_named_motion(str(motion), motions, responder.character)
     (response,) = responder.respond([(motion.resampled(fps), impact)])
     if response.diverged is not None:
         raise SimulationError(
@@ -224,6 +234,7 @@ def hit(
         _hit=Hit(0, _values(kind, impact), impact),
         _record={"experiment": f"{kind} on {base['motion']}", "count": 1, "base": base, **record},
         _responder=responder,
+        _inputs=frozenset(inputs),
     )
 
 

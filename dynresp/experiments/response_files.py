@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, get_args
 
@@ -20,7 +21,8 @@ from dynresp.results.result_folder import (
     WRITTEN,
     Artefact,
     NothingToShowError,
-    clear_response,
+    claim,
+    clear,
 )
 from dynresp.results.result_json import write_json
 from dynresp.results.story_files import story_writers, write_files
@@ -37,11 +39,14 @@ def write_response(
     output: OutputTable,
     responder: Responder,
     progress: Progress,
+    *,
+    inputs: Collection[Path] = (),
+    overwrite: bool = False,
 ) -> dict[str, Any]:
     """Write one response to a folder.
 
-    Files of an earlier run that this one does not write are removed, so that all files in the
-    folder belong together.
+    Files of an earlier result that this one does not write are removed, so that all files of
+    results in the folder belong together.
 
     Args:
         folder: Where to; made if it is missing.
@@ -53,30 +58,39 @@ def write_response(
         output: What to write.
         responder: What made the response.
         progress: Called with the stage, how many steps are done, and of how many.
+        inputs: Files that were read for it, which are never written.
+        overwrite: Whether files that no earlier result names as its own may be replaced.
 
     Returns:
         The content of `result.json`, which is written even if other files fail; under `files` it
         says for each file whether it was written, and if not, why.
 
     Raises:
+        UsageError: A file of somebody else would be replaced, or an input; nothing was written.
         DynrespError: `result.json` cannot be written.
     """
+    names = response_files(output)
+    own = claim(folder, RESULT, names, inputs=inputs, overwrite=overwrite)
     shown = response_story(response, hit.impact, output.lead_in_s, title, _subtitle(hit, response))
     story, character = shown.story, responder.character
     writers = {
         **story_writers(story, character, output.video_size_px, output.video_fps, progress),
         "alignment.png": lambda path: _write_alignment(path, response, title, responder),
     }
-    names = [name for name in get_args(Artefact) if name in output.write]
     files = write_files(folder, names, writers, progress)
     there = [name for name, what in files.items() if what == WRITTEN]
-    left = clear_response(folder, [RESULT, *there])
+    left = clear(folder, own - {RESULT, *there})
     files |= {name: what for name, what in left.items() if name not in files}
     described = describe(hit, response, quality, shown, responder.library)
     content = {**record, **described, "files": files}
     write_json(content, folder / RESULT)
     progress(f"writing {RESULT}", len(names), len(names))
     return content
+
+
+def response_files(output: OutputTable) -> list[str]:
+    """The files of a response, besides `result.json`, in the order in which they are written."""
+    return [name for name in get_args(Artefact) if name in output.write]
 
 
 def _write_alignment(path: Path, response: Response, title: str, responder: Responder) -> None:

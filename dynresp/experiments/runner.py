@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from dynresp.experiments import batch_summary as batch
 from dynresp.experiments.experiment_spec import Experiment
-from dynresp.experiments.response_files import write_response
+from dynresp.experiments.response_files import response_files, write_response
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.named_motion import NamedMotion, load_spec_motion
 from dynresp.motion.reactions.named_library import library_record, load_named_library
@@ -31,11 +31,14 @@ from dynresp.results.result_folder import (
     SUMMARY,
     TABLE,
     attempt,
-    clear_batch,
+    check_claim,
+    claim,
+    clear,
     hit_folder,
 )
 from dynresp.results.result_json import versions, write_json
 from dynresp.support.errors import MotionError, SpecError
+from dynresp.support.inputs import inputs_noted
 from dynresp.support.progress import Progress, no_progress
 
 # Hits are simulated in groups of this size, so that memory does not grow with their number.
@@ -65,6 +68,7 @@ class Run:
         choosing: What chooses among them, and its record.
         config: Settings.
         threads: Threads for the physics, 0 for all cores.
+        inputs: The files that were read, which no result replaces.
     """
 
     experiment: Experiment
@@ -76,6 +80,7 @@ class Run:
     choosing: NamedChooser
     config: ResponseConfig
     threads: int = 0
+    inputs: frozenset[Path] = frozenset()
     responder: Responder = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -157,35 +162,37 @@ def prepare_run(
         SpecError: A value does not fit the motions, such as the time of a hit.
         DynrespError: A motion or a library cannot be read.
     """
-    character = default_character()
-    folders = motion_folders(motions)
-    config = response_config(experiment.settings)
-    fps = config.physics.fps
-    base = load_spec_motion(
-        experiment.base, experiment.base.otherwise, "base", folders, beside, fps, character
-    )
-    striker = None
-    impact = experiment.impact[0]
-    if isinstance(impact, StrikeTable):
-        table = impact.striker
-        key = "impact.striker"
-        striker = load_spec_motion(table, table.otherwise, key, folders, beside, fps, character)
-        cut = striker.cut
-        assert isinstance(cut, StrikerCut)
-        if cut.hit_s > striker.motion.duration:
-            raise SpecError(
-                f"{key}.hit_s: expected at most {striker.motion.duration:.2f} s, which is how long "
-                f"the striker's motion lasts, got {cut.hit_s:g}"
-            )
-    library = load_named_library(experiment.library.which, folders, beside, fps, character)
-    chosen = experiment.experiment.seed if seed is None else seed
-    try:
-        choice_table = experiment.choice.model_copy(update=dict(choice or {}))
-        choosing = make_chooser(choice_table, character, library, config, beside)
-    except MotionError as error:
-        # A clip of the library that is shorter than a window.
-        raise SpecError(f"settings.window_s: {error}") from None
-    run = Run(experiment, chosen, character, base, striker, library, choosing, config, threads)
+    with inputs_noted() as inputs:
+        character = default_character()
+        folders = motion_folders(motions)
+        config = response_config(experiment.settings)
+        fps = config.physics.fps
+        base = load_spec_motion(
+            experiment.base, experiment.base.otherwise, "base", folders, beside, fps, character
+        )
+        striker = None
+        impact = experiment.impact[0]
+        if isinstance(impact, StrikeTable):
+            table = impact.striker
+            key = "impact.striker"
+            striker = load_spec_motion(table, table.otherwise, key, folders, beside, fps, character)
+            cut = striker.cut
+            assert isinstance(cut, StrikerCut)
+            if cut.hit_s > striker.motion.duration:
+                raise SpecError(
+                    f"{key}.hit_s: expected at most {striker.motion.duration:.2f} s, which is how "
+                    f"long the striker's motion lasts, got {cut.hit_s:g}"
+                )
+        library = load_named_library(experiment.library.which, folders, beside, fps, character)
+        chosen = experiment.experiment.seed if seed is None else seed
+        try:
+            choice_table = experiment.choice.model_copy(update=dict(choice or {}))
+            choosing = make_chooser(choice_table, character, library, config, beside)
+        except MotionError as error:
+            # A clip of the library that is shorter than a window.
+            raise SpecError(f"settings.window_s: {error}") from None
+        run = Run(experiment, chosen, character, base, striker, library, choosing, config, threads)
+    run = replace(run, inputs=frozenset(inputs))
     _check_times(run)
     return run
 
@@ -214,31 +221,42 @@ def _time(hit: Hit) -> float:
     return hit.impact.time
 
 
-def run_experiment(run: Run, out: Path, progress: Progress | None = None) -> dict[str, Any]:
+def run_experiment(
+    run: Run, out: Path, progress: Progress | None = None, *, overwrite: bool = False
+) -> dict[str, Any]:
     """Simulate all hits of an experiment and write the result folder.
 
     Args:
         run: The experiment, loaded.
         out: Folder to write to; made if it is missing.
         progress: Called with the stage, how many are done, and of how many.
+        overwrite: See `write_results`.
 
     Returns:
         See `write_results`.
 
     Raises:
+        UsageError: As `write_results`, before anything is simulated.
         DynrespError: `result.json` or `summary.json` cannot be written.
     """
     progress = progress or no_progress
     count = run.experiment.experiment.count
-    return write_results(run, run.results(range(count), progress), out, progress)
+    check_claim(out, _names(run), inputs=run.inputs, overwrite=overwrite)
+    results = run.results(range(count), progress)
+    return write_results(run, results, out, progress, overwrite=overwrite)
 
 
 def write_results(
-    run: Run, results: Iterable[HitResult], out: Path, progress: Progress
+    run: Run,
+    results: Iterable[HitResult],
+    out: Path,
+    progress: Progress,
+    *,
+    overwrite: bool = False,
 ) -> dict[str, Any]:
     """Write the result folder of an experiment.
 
-    Files of an earlier run are removed, so that all of dynresp's files in the folder belong
+    Files of an earlier result are removed, so that all files of results in the folder belong
     together.
 
     Args:
@@ -246,20 +264,23 @@ def write_results(
         results: Of all its hits, in order. Those that are not written in full are not kept.
         out: Folder to write to; made if it is missing.
         progress: Called with the stage, how many are done, and of how many.
+        overwrite: Whether files that no earlier result names as its own may be replaced.
 
     Returns:
         The content of `result.json`; of a batch, of `summary.json`.
 
     Raises:
+        UsageError: A file of somebody else would be replaced, or an input; nothing was written.
         DynrespError: `result.json` or `summary.json` cannot be written.
     """
     table = run.experiment.experiment
     record = run.record()
+    rights: Any = {"inputs": run.inputs, "overwrite": overwrite}
 
     def write(result: HitResult, where: Path, title: str) -> dict[str, Any]:
         return write_response(
             where, title, result.hit, result.response, result.quality, record,
-            run.experiment.output, run.responder, progress,
+            run.experiment.output, run.responder, progress, **rights,
         )  # fmt: skip
 
     if table.count == 1:
@@ -267,12 +288,14 @@ def write_results(
         return write(result, out, table.name)
 
     shown = chosen_hits(run.seed, table.count, table.show)
+    names = _names(run)
+    own = claim(out, SUMMARY, names, **rights)
     rows, picked = [], []
     for result in results:
         rows.append(batch.row(result.hit, result.response, result.quality))
         if result.hit.number in shown:
             picked.append(result)
-    files = clear_batch(out, shown)
+    files = clear(out, own - {SUMMARY, *names})
     files[TABLE] = attempt(lambda path: batch.write_table(rows, path), out / TABLE)
     for result in picked:
         number = result.hit.number
@@ -288,6 +311,15 @@ def write_results(
     summary = {**record, "shown": shown, **batch.summarise(rows), "files": files}
     write_json(summary, out / SUMMARY)
     return summary
+
+
+def _names(run: Run) -> list[str]:
+    """Names of the files of an experiment's result folder."""
+    table, each = run.experiment.experiment, response_files(run.experiment.output)
+    if table.count == 1:
+        return [RESULT, *each]
+    hits = [hit_folder(number) for number in chosen_hits(run.seed, table.count, table.show)]
+    return [SUMMARY, TABLE, *(f"{hit}/{name}" for hit in hits for name in (RESULT, *each))]
 
 
 def chosen_hits(seed: int, count: int, show: int) -> list[int]:

@@ -8,15 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynresp.results.result_folder import WRITTEN, attempt
-from dynresp.results.result_json import write_json
+from dynresp.results.result_folder import (
+    CONFUSION,
+    EVALUATION,
+    PER_STRATEGY,
+    WRITTEN,
+    attempt,
+    claim,
+)
+from dynresp.results.result_json import versions, write_json
 from dynresp.support.extras import require
 from dynresp.support.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-EVALUATION, TABLE, PICTURE = "evaluation.json", "per_strategy.csv", "confusion.png"
 
 _DPI = 150
 _INK = "#23272e"
@@ -24,26 +30,36 @@ _INK = "#23272e"
 _MAX_NAMED, _MAX_NUMBERED = 80, 40
 
 
-def write_report(folder: Path, content: dict[str, Any]) -> dict[str, str]:
+FILES = (EVALUATION, PER_STRATEGY, CONFUSION)
+
+
+def write_report(
+    folder: Path, content: dict[str, Any], *, overwrite: bool = False
+) -> dict[str, Any]:
     """Write an evaluation.
 
     Args:
         folder: The folder; made if it is missing.
         content: What `evaluate` gives.
+        overwrite: Whether files that no earlier result names as its own may be replaced.
 
     Returns:
-        For each file what became of it, as `result_folder.attempt` returns it.
+        What was written to `evaluation.json`: the content, and under `files` for each other file
+        what became of it, as `result_folder.attempt` returns it.
 
     Raises:
+        UsageError: A file of somebody else would be replaced; nothing was written.
         DynrespError: `evaluation.json` or `per_strategy.csv` cannot be written.
     """
-    write_json(content, folder / EVALUATION)
-    _write_table(folder / TABLE, content["per_strategy"])
-    return {
-        EVALUATION: WRITTEN,
-        TABLE: WRITTEN,
-        PICTURE: attempt(lambda path: write_confusion(path, content), folder / PICTURE),
+    claim(folder, EVALUATION, FILES[1:], overwrite=overwrite)
+    _write_table(folder / PER_STRATEGY, content["per_strategy"])
+    files = {
+        PER_STRATEGY: WRITTEN,
+        CONFUSION: attempt(lambda path: write_confusion(path, content), folder / CONFUSION),
     }
+    whole = {**content, "files": files, "versions": versions()}
+    write_json(whole, folder / EVALUATION)
+    return whole
 
 
 def _write_table(path: Path, per_strategy: dict[str, dict[str, Any]]) -> None:

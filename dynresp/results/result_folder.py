@@ -1,17 +1,21 @@
-"""The result folder: names of its files, writing them, and removing those of earlier runs.
+"""The result folder: names of its files, writing them, and removing those of earlier results.
 
-Only files that dynresp writes itself are ever removed.
+Only files are replaced or removed that a record in the folder (`result.json` and the like) names as
+written by an earlier result. A file that was read is never written.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 from typing import Literal, get_args
 
-from dynresp.support.errors import DynrespError, MissingExtraError
+from dynresp.results.result_json import versions, write_json
+from dynresp.support.errors import DynrespError, MissingExtraError, UsageError
+from dynresp.support.inputs import noted_inputs
 
 Artefact = Literal[
     "motion.npz",
@@ -26,15 +30,17 @@ Artefact = Literal[
 PLAN, OPTIONS, WATCHING = "plan.png", "options.png", "watching.png"
 """Pictures of a path on the ground, of the actions offered, and of the video followed."""
 RESULT, SUMMARY, TABLE = "result.json", "summary.json", "table.csv"
+EVALUATION, PER_STRATEGY, CONFUSION = "evaluation.json", "per_strategy.csv", "confusion.png"
 
 WRITTEN = "written"
 """What `files` in `result.json` says of a written file."""
 _NOT_WRITTEN = "not written: "
 _FAILED = "failed: "
+_UNFINISHED = "unfinished"
 
-_ARTEFACTS: tuple[str, ...] = get_args(Artefact)
-_OF_A_RESPONSE = (RESULT, *_ARTEFACTS, PLAN, OPTIONS, WATCHING)
-_HIT = re.compile(r"hit_\d{5,}")
+_NAMES = (*get_args(Artefact), RESULT, PLAN, OPTIONS, WATCHING, TABLE, PER_STRATEGY, CONFUSION)
+_OURS = re.compile(rf"(hit_\d{{5,12}}/)?({'|'.join(map(re.escape, _NAMES))})")
+_MAX_RECORD_BYTES = 64 << 20
 
 
 class NothingToShowError(DynrespError):
@@ -80,62 +86,127 @@ def _in_a_line(error: Exception) -> str:
     return f"{type(error).__name__}: {text[:300]}" if text else type(error).__name__
 
 
-def clear_response(folder: Path, written: Collection[str]) -> dict[str, str]:
-    """Remove files of earlier runs from the folder of a response.
+def claim(
+    folder: Path,
+    record: str,
+    names: Collection[str],
+    *,
+    inputs: Collection[Path] = (),
+    overwrite: bool = False,
+) -> set[str]:
+    """Take a folder for a new result, whose record then names its files as the result's own.
+
+    Call it before the first file is written: what an interrupted run leaves is its own, too.
 
     Args:
-        folder: The folder.
-        written: Names of this run's files, which stay.
+        folder: The result folder; made if it is missing.
+        record: The file that will name the others, such as `RESULT`.
+        names: The files that will be written, besides the record.
+        inputs: See `check_claim`.
+        overwrite: See `check_claim`.
+
+    Returns:
+        The names of the files that are the result's own now, those of earlier results among them.
+
+    Raises:
+        UsageError: As `check_claim`; nothing was written.
+        DynrespError: The record cannot be written.
+    """
+    check_claim(folder, [record, *names], inputs=inputs, overwrite=overwrite)
+    own = own_files(folder) | {record, *names}
+    claimed = dict.fromkeys(sorted(own - {record}), _UNFINISHED)
+    write_json({"files": claimed, "versions": versions()}, folder / record)
+    return own
+
+
+def check_claim(
+    folder: Path,
+    names: Collection[str],
+    *,
+    inputs: Collection[Path] = (),
+    overwrite: bool = False,
+) -> None:
+    """Refuse to replace or remove a file that no earlier result in the folder names as its own.
+
+    Args:
+        folder: The result folder.
+        names: The files that will be written.
+        inputs: Files that were read, besides those that `inputs_noted` notes: they are never
+            written, not even with `overwrite`.
+        overwrite: Whether the user has said that all other files may be replaced.
+
+    Raises:
+        UsageError: There is such a file.
+    """
+    own = own_files(folder)
+    read = {path.resolve() for path in inputs} | noted_inputs()
+    there = [name for name in sorted(own.union(names)) if (folder / name).is_file()]
+    for name in there:
+        if (folder / name).resolve() in read:
+            raise UsageError(
+                f"{folder / name} is read for this result, and would be replaced or removed by it; "
+                "choose another folder for the result"
+            )
+    foreign = [] if overwrite else [name for name in there if name not in own]
+    if foreign:
+        more = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
+        raise UsageError(
+            f"{folder} holds {', '.join(foreign[:3])}{more}, which no earlier result there names "
+            "as its own; choose another folder, or allow to replace files (--overwrite, in Python "
+            "overwrite=True)"
+        )
+
+
+def own_files(folder: Path) -> set[str]:
+    """Names of the files that the results in a folder say they have written, with their records."""
+    own: set[str] = set()
+    for record in (RESULT, SUMMARY, EVALUATION):
+        files = _claimed(folder / record)
+        if files is not None:
+            own |= {record, *files}
+    return own
+
+
+def clear(folder: Path, old: Collection[str]) -> dict[str, str]:
+    """Remove files of earlier results.
+
+    Args:
+        folder: The result folder.
+        old: Names of the files, from `claim`.
 
     Returns:
         For each file that could not be removed, what `files` says of it.
     """
-    old = [name for name in (*_OF_A_RESPONSE, SUMMARY, TABLE) if name not in written]
-    return _remove(folder, old) | _remove_hits(folder, ())
-
-
-def clear_batch(folder: Path, shown: Collection[int]) -> dict[str, str]:
-    """Remove files of earlier runs from the folder of a batch.
-
-    Args:
-        folder: The folder.
-        shown: The hits that this run writes in full; their folders stay.
-
-    Returns:
-        For each file that could not be removed, what `files` says of it.
-    """
-    return _remove(folder, _OF_A_RESPONSE) | _remove_hits(folder, shown)
-
-
-def _remove_hits(out: Path, shown: Collection[int]) -> dict[str, str]:
-    """Remove the folders of hits that are not shown."""
-    ours = {hit_folder(number) for number in shown}
-    try:
-        entries = sorted(out.iterdir())
-    except OSError:
-        return {}
-    failed: dict[str, str] = {}
-    for entry in entries:
-        old = _HIT.fullmatch(entry.name) and entry.name not in ours
-        if not old or entry.is_symlink() or not entry.is_dir():
-            continue
-        kept = _remove(entry, _OF_A_RESPONSE)
-        failed |= {f"{entry.name}/{name}": what for name, what in kept.items()}
-        # A folder with files of the user stays.
-        with suppress(OSError):
-            entry.rmdir()
-    return failed
-
-
-def _remove(folder: Path, names: Collection[str]) -> dict[str, str]:
     failed = {}
-    for name in names:
+    for name in sorted(old):
         path = folder / name
-        # dynresp makes no folder of that name.
-        if path.is_dir() and not path.is_symlink():
+        # dynresp makes neither links nor folders of such names.
+        if path.parent.is_symlink() or (path.is_dir() and not path.is_symlink()):
             continue
         try:
             path.unlink(missing_ok=True)
         except OSError as error:
             failed[name] = f"{_FAILED}one of an earlier run cannot be removed ({error.strerror})"
+        if path.parent != folder:
+            # A folder with files of the user stays.
+            with suppress(OSError):
+                path.parent.rmdir()
     return failed
+
+
+def _claimed(record: Path) -> set[str] | None:
+    """Files of a result that a record names as written; None if the record is not dynresp's."""
+    try:
+        with record.open("rb") as file:
+            data = file.read(_MAX_RECORD_BYTES + 1)
+        content = json.loads(data) if len(data) <= _MAX_RECORD_BYTES else None
+    # A record of another program may hold anything.
+    except (OSError, ValueError, RecursionError):
+        return None
+    if not isinstance(content, dict):
+        return None
+    files, made_with = content.get("files"), content.get("versions")
+    if not (isinstance(files, dict) and isinstance(made_with, dict) and "dynresp" in made_with):
+        return None
+    states = (WRITTEN, _UNFINISHED)
+    return {name for name, what in files.items() if what in states and _OURS.fullmatch(name)}

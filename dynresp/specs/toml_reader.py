@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dynresp.support.errors import SpecError
+from dynresp.support.inputs import open_input
 
 MAX_FILE_BYTES = 4 << 20
 """Largest file that is read [bytes]."""
@@ -24,7 +25,7 @@ def read_toml(path: Path, what: str, hint: str = "") -> dict[str, Any]:
         SpecError: It cannot be read, is too large or not TOML. The message names the file.
     """
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         why = "no such file" if isinstance(error, FileNotFoundError) else error.strerror

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from dynresp.support.errors import UsageError
 from dynresp.support.files import replacing
+from dynresp.support.inputs import open_input
 
 Arrays: TypeAlias = dict[str, npt.NDArray[Any]]
 
@@ -87,7 +88,7 @@ class ArchiveFormat:
             if not path.is_file():
                 what = "is a folder" if path.is_dir() else "no such file"
                 self.fail(path, f"{what}; expected a .npz {self.what} file")
-            with path.open("rb") as file:
+            with open_input(path) as file:
                 self._check_archive(path, file)
                 with zipfile.ZipFile(file) as archive:
                     return self._arrays(path, archive)

@@ -299,9 +299,16 @@ def test_a_name_that_is_no_text_and_pictures_of_an_earlier_run(
     except OSError:
         pytest.skip("this file system takes names in UTF-8 only")
     out.mkdir()
-    for name in ("options.png", "watching.png", "mine.png"):
+    earlier = ("options.png", "watching.png")
+    for name in (*earlier, "mine.png", "alignment.png"):
         (out / name).touch()
+    record = {"files": dict.fromkeys(earlier, "written"), "versions": {"dynresp": "0.1.0"}}
+    (out / "result.json").write_text(json.dumps(record))
     result = dynresp("graph", "walk", odd, "--seconds", "2", "--no-video", "--out", out, "--json")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["title"].endswith("x?.npz")
-    assert {path.name for path in out.iterdir()} == FILES | {"result.json", "mine.png"}
+    assert {path.name for path in out.iterdir()} == FILES | {
+        "result.json",
+        "mine.png",
+        "alignment.png",
+    }

@@ -75,7 +75,7 @@ def test_import_takes_the_given_options(world: Path, dynresp: Command) -> None:
     result = dynresp("motions", "import", bvh, "--out", world / "b", *options)
     assert result.exit_code == 0, result.stderr
     assert read_npz(result.stdout.strip()).fps == 60.0
-    result = dynresp("motions", "import", world / "stand.npz", "--unit", 1, "--out", world / "b")
+    result = dynresp("motions", "import", world / "stand.npz", "--unit", 1, "--out", world / "c")
     assert result.exit_code == 2
     assert "leave them out" in result.stderr
 

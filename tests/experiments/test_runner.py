@@ -80,6 +80,8 @@ def test_a_miss_goes_on_with_the_base_motion(world: Path, character: Character) 
     edit(world, "[output]\n", "[output]\n" + SMALL)
     (world / "out").mkdir()
     (world / "out" / "alignment.png").write_bytes(b"of an earlier run")
+    record = {"files": {"alignment.png": "written"}, "versions": {"dynresp": "0.1.0"}}
+    (world / "out" / "result.json").write_text(json.dumps(record))
     content = run(world)
     assert content["happened"] == {"outcome": "miss"}
     assert content["quality"] is None

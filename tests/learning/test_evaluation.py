@@ -8,11 +8,11 @@ import pytest
 
 from dynresp.datasets.dataset_reader import Dataset
 from dynresp.learning.evaluation import evaluate
-from dynresp.learning.evaluation_files import EVALUATION, PICTURE, TABLE, write_report
+from dynresp.learning.evaluation_files import write_report
 from dynresp.learning.holdout import Split
 from dynresp.learning.training import Trained, train
 from dynresp.response.prediction.classifier import ClassifierError
-from dynresp.results.result_folder import WRITTEN
+from dynresp.results.result_folder import CONFUSION, EVALUATION, PER_STRATEGY, WRITTEN
 from dynresp.support.errors import UsageError
 
 from .conftest import QUICK
@@ -126,11 +126,11 @@ def test_strategies_are_judged_by_their_best_member(hits: Dataset) -> None:
 
 def test_the_folder_of_an_evaluation(trained: Trained, hits: Dataset, tmp_path: Path) -> None:
     content = evaluate(trained.classifier, hits, quiet)
-    files = write_report(tmp_path / "out", content)
-    assert files == dict.fromkeys([EVALUATION, TABLE, PICTURE], WRITTEN)
+    files = write_report(tmp_path / "out", content)["files"]
+    assert files == dict.fromkeys([PER_STRATEGY, CONFUSION], WRITTEN)
     reported = json.loads((tmp_path / "out" / EVALUATION).read_text(encoding="utf-8"))
     assert reported["accuracy"] == pytest.approx(content["accuracy"], abs=1e-6)
-    with (tmp_path / "out" / TABLE).open(encoding="utf-8") as file:
+    with (tmp_path / "out" / PER_STRATEGY).open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["strategy"] for row in rows] == list(content["per_strategy"])
-    assert (tmp_path / "out" / PICTURE).read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / CONFUSION).read_bytes().startswith(b"\x89PNG")

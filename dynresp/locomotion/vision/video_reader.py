@@ -12,6 +12,7 @@ import numpy as np
 from dynresp.locomotion.vision.segmentation import Picture
 from dynresp.support.errors import MotionFileError
 from dynresp.support.extras import require
+from dynresp.support.inputs import note_input
 
 MAX_SIDE = 8192
 """Largest number of pixels along a side of a picture."""
@@ -49,6 +50,8 @@ class Video:
             raise MotionFileError(
                 f"{self.name}: {what}; give a video file, or a camera (such as camera:0)"
             )
+        if not is_camera:
+            note_input(Path(self.name))
         # OpenCV crashes on a name that Python cannot encode.
         try:
             self.name.encode()

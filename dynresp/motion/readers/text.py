@@ -10,6 +10,7 @@ import numpy as np
 
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import MotionFileError
+from dynresp.support.inputs import open_input
 
 MAX_FILE_BYTES = 128 * 2**20
 """Largest motion file that is read [bytes]; text of MAX_POSES takes about as much."""
@@ -57,7 +58,7 @@ def read_bounded(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "no such file"
             raise file_error(path, f"{what}; expected a motion file")
-        with path.open("rb") as file:
+        with open_input(path) as file:
             data = file.read(limit + 1)
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise file_error(path, f"cannot be read ({error})") from error

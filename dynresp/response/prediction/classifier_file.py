@@ -47,6 +47,7 @@ from dynresp.response.prediction.hit_features import identity as features_identi
 from dynresp.support.errors import DynrespError
 from dynresp.support.extras import require
 from dynresp.support.files import replacing
+from dynresp.support.inputs import open_input
 
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
@@ -193,7 +194,7 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "no such file"
             raise ClassifierError(f"{what}; expected what `dynresp train` has written")
-        with path.open("rb") as file:
+        with open_input(path) as file:
             _check_archive(file)
             with zipfile.ZipFile(file) as archive:
                 if sum(member.file_size for member in archive.infolist()) > MAX_FILE_BYTES:
