@@ -1,7 +1,7 @@
 """The compiled kinematics of the character: where all bodies are, frame by frame.
 
-Importing this module compiles it (about a second) or loads it from numba's cache; import it where
-it is used. The sums are those of `rotations.multiply` and `rotations.rotate`, in their order.
+Importing this module imports numba; so import it where it is used. The sums are those of
+`rotations.multiply` and `rotations.rotate`, in their order.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Compiled step of `dynresp.locomotion.choice.actions`: the candidate least like all offers so far.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used.
+Importing this module imports numba; so import it where it is used.
 """
 
 from __future__ import annotations

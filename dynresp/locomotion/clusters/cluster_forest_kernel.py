@@ -1,7 +1,7 @@
 """Compiled loops of the cluster forest: grow a tree, and follow its edges.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. `dynresp.locomotion.clusters.cluster_forest` describes what is computed, and why.
+Importing this module imports numba; so import it where it is used.
+`dynresp.locomotion.clusters.cluster_forest` describes what is computed, and why.
 """
 
 from __future__ import annotations

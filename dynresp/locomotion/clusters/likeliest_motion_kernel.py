@@ -1,7 +1,7 @@
 """Compiled search for the most probable motion along a cluster path (Lee et al. 2002, eq. 7).
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. `dynresp.locomotion.clusters.cluster_forest` describes what is computed, and why.
+Importing this module imports numba; so import it where it is used.
+`dynresp.locomotion.clusters.cluster_forest` describes what is computed, and why.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numba import types
 
 from dynresp.locomotion.clusters.cluster_forest_kernel import EDGES, INTS, OFFSETS, REALS, TABLE
+from dynresp.support.array_growth_kernel import doubled
 from dynresp.support.compiling import compiled, helper
-from dynresp.support.growing_kernel import doubled
 
 _PLAIN: dict[str, Any] = {"error_model": "numpy"}
 

@@ -1,11 +1,10 @@
 """Compiled search for pairs of frames that resemble each other.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. There are two passes over the pairs of a row. The first drops most pairs by a lower bound:
-each frame has a vector of 16 numbers, and the squared distance of two vectors is never above the
-distance of the frames. The second computes the remaining distances in full. Every pair is computed
-once, by the same instructions wherever its row begins, so the result does not depend on how rows
-are divided among threads.
+Importing this module imports numba; so import it where it is used. There are two passes over the
+pairs of a row. The first drops most pairs by a lower bound: each frame has a vector of 16 numbers,
+and the squared distance of two vectors is never above the distance of the frames. The second
+computes the remaining distances in full. Every pair is computed once, by the same instructions
+wherever its row begins, so the result does not depend on how rows are divided among threads.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ import math
 import numpy as np
 from numba import types
 
+from dynresp.support.array_growth_kernel import doubled
 from dynresp.support.compiling import compiled, helper
-from dynresp.support.growing_kernel import doubled
 
 LANES = 16
 """Rotations of a frame, padded with the identity: one vector."""

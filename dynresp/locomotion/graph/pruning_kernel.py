@@ -1,7 +1,6 @@
 """Compiled loop of the third pruning rule: local maxima of the transition matrix.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used.
+Importing this module imports numba; so import it where it is used.
 """
 
 from __future__ import annotations

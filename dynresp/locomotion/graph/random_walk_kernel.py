@@ -1,6 +1,6 @@
 """Compiled loop of random walks.
 
-Importing this module compiles it or loads it from numba's cache; import it where it is used.
+Importing this module imports numba; so import it where it is used.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Compiled best-first search through a motion graph along a path.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used.
+Importing this module imports numba; so import it where it is used.
 
 A state is a frame with several edges, the placement of its clip, and the progress along the path.
 Following an edge plays all frames up to the next such frame. The heap holds edges that leave a
@@ -37,8 +36,8 @@ from dynresp.locomotion.worlds.collision_kernel import (
 from dynresp.locomotion.worlds.footprint_kernel import BODY, footprint
 from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
 from dynresp.motion.kinematics_kernel import kinematics_kernel
+from dynresp.support.array_growth_kernel import doubled
 from dynresp.support.compiling import compiled, helper
-from dynresp.support.growing_kernel import doubled
 
 
 class SearchSettings(NamedTuple):

@@ -20,8 +20,8 @@ from numba import types
 from numba.typed import Dict
 
 from dynresp.locomotion.worlds.path_kernel import eq_8, nearest_on
+from dynresp.support.array_growth_kernel import doubled
 from dynresp.support.compiling import compiled, helper
-from dynresp.support.growing_kernel import doubled
 
 # Eq. 8: c, and how far ahead on the path the point is that the avatar should face [m].
 _FACING, _AHEAD_M = 0.2, 0.6

@@ -1,7 +1,7 @@
 """The compiled part of `dynresp.motion.feet.foot_fitting`: where one foot is to be, frame by frame.
 
-Importing this module compiles it (some seconds) or loads it from numba's cache; import it where it
-is used. `foot_fitting_place_kernel` says what the arguments hold.
+Importing this module imports numba; so import it where it is used. `foot_fitting_place_kernel` says
+what the arguments hold.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The compiled part of `dynresp.motion.feet.skating`.
 
-Importing this module compiles it (about a second) or loads it from numba's cache; import it where
-it is used.
+Importing this module imports numba; so import it where it is used.
 """
 
 from __future__ import annotations

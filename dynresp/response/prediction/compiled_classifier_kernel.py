@@ -1,8 +1,7 @@
 """Compiled loops of prediction: all pairs of classes, or only the pairs that decide.
 
-Importing this module compiles it (a few seconds) or loads it from numba's cache; import it where
-it is used. The kernels compute every row with the same instructions, so a row has the same result,
-bit for bit, alone and in any batch.
+Importing this module imports numba; so import it where it is used. The kernels compute every row
+with the same instructions, so a row has the same result, bit for bit, alone and in any batch.
 
 The score of a class is its votes in all pairs, plus a bounded confidence that orders equal votes.
 The best class is found without most of the pairs. First comes a knock-out: each class is compared

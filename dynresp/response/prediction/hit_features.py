@@ -11,14 +11,16 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.character import POSE_SIZE, VELOCITY_SIZE, Character
-from dynresp.motion.rotations import FloatArray
 from dynresp.support.errors import MotionError, UsageError
+
+if TYPE_CHECKING:
+    from dynresp.response.prediction.hit_features_kernel import Body
 
 SLICES_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Times after contact at which states are recorded [s]. The paper records the first four. An
@@ -134,22 +136,22 @@ def extract(
     seen = frames[frames < pose.shape[1]]
     features = np.full((len(pose), len(FEATURE_NAMES)), np.nan, dtype=np.float32)
     features_kernel(
-        np.ascontiguousarray(pose), np.ascontiguousarray(rate), seen, *_body(character), features
+        np.ascontiguousarray(pose), np.ascontiguousarray(rate), seen, _body(character), features
     )
     return features
 
 
 @functools.lru_cache(maxsize=4)
-def _body(
-    character: Character,
-) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray, FloatArray, npt.NDArray[np.intp]]:
-    """The kernel's arrays of a character: parents, offsets, centres, mass shares, BODIES."""
-    return (
-        character.parents.astype(np.int64),
-        np.ascontiguousarray(character.offsets),
-        np.ascontiguousarray(character.model.body_ipos[1:]),
-        character.masses / character.masses.sum(),
-        np.array([character.body(name) for name in BODIES], np.int64),
+def _body(character: Character) -> Body:
+    """What the kernel needs of a character; its signature knows arrays that can be written."""
+    from dynresp.response.prediction.hit_features_kernel import Body
+
+    return Body(
+        parents=character.parents.astype(np.int64),
+        offsets=np.array(character.offsets, np.float64),
+        centers=np.array(character.model.body_ipos[1:], np.float64),
+        shares=character.masses / character.masses.sum(),
+        chosen=np.array([character.body(name) for name in BODIES], np.int64),
     )
 
 

@@ -10,12 +10,17 @@ searches of the same windows agree in every bit.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.response.windows.windows import LANES, LibraryWindows, WindowSet
+from dynresp.support.arrays import frozen
 from dynresp.support.errors import MotionError
+
+if TYPE_CHECKING:
+    from dynresp.response.windows.window_kernel import Best
 
 ERROR_FLOOR = 2e-5
 """Absolute uncertainty of a mismatch [m], for 14 bodies a few metres from the pelvis and weights of
@@ -97,7 +102,7 @@ class FullSearchResult:
             UnknownNameError: There is no such reaction.
         """
         library = self.library.subset([reaction])
-        *_, errors = _run(self.trace, library, early_stop=False)
+        _, errors = _run(self.trace, library, early_stop=False)
         entries = library.windows[0].starts
         return ErrorSurface(errors[:, : len(entries)], self.trace.starts, entries)
 
@@ -138,12 +143,12 @@ def search(
             f"the trace has {trace.bodies} bodies, the library {library.windows[0].bodies}; "
             "both must be of one character"
         )
-    errors, exits, entries, _ = _run(trace, library, early_stop=early_stop)
-    starts = [w.starts[at] for w, at in zip(library.windows, entries, strict=True)]
+    best, _ = _run(trace, library, early_stop=early_stop)
+    starts = [w.starts[at] for w, at in zip(library.windows, best.entries, strict=True)]
     return FullSearchResult(
         names=library.names,
-        errors=errors,
-        exit_frames=trace.starts[exits],
+        errors=best.errors,
+        exit_frames=trace.starts[best.exits],
         entry_frames=np.array(starts, dtype=np.int64),
         trace=trace,
         library=library,
@@ -152,38 +157,29 @@ def search(
 
 def _run(
     trace: WindowSet, library: LibraryWindows, *, early_stop: bool
-) -> tuple[
-    npt.NDArray[np.float32],
-    npt.NDArray[np.int64],
-    npt.NDArray[np.int64],
-    npt.NDArray[np.float32],
-]:
-    """Call the kernel: least mismatches, their exit and entry indices, and its scratch."""
+) -> tuple[Best, npt.NDArray[np.float32]]:
+    """Call the kernel: the best of every reaction, and its scratch."""
     # Importing numba takes a third of a second.
-    from dynresp.response.windows.window_kernel import search_kernel
+    from dynresp.response.windows import window_kernel as kernel
 
     config = library.config
     frame_weights = config.frame_weights()[:, None]
     position_weight, angle_weight = config.body_weights(trace.bodies)
     reactions = len(library.names)
-    errors = np.empty(reactions, np.float32)
-    exits = np.empty(reactions, np.int64)
-    entries = np.empty(reactions, np.int64)
+    best = kernel.Best(
+        np.empty(reactions, np.float32),
+        np.empty(reactions, np.int64),
+        np.empty(reactions, np.int64),
+    )
     widest = max(windows.data.shape[3] for windows in library.windows)
     scratch = np.empty((len(trace), widest), np.float32)
-    search_kernel(
-        trace.data,
-        len(trace),
-        library.buffer,
-        library.offsets,
-        np.array([len(windows) for windows in library.windows], np.int64),
+    counts = np.array([len(windows) for windows in library.windows], np.int64)
+    weights = kernel.BodyWeights(
         (frame_weights * position_weight).astype(np.float32),
         (frame_weights * angle_weight).astype(np.float32),
-        LANES,
-        early_stop,
-        errors,
-        exits,
-        entries,
-        scratch,
     )
-    return errors, exits, entries, scratch
+    # The kernel's signature knows read-only ones; unpickled arrays can be written.
+    arrays = [frozen(array.view()) for array in (library.buffer, library.offsets, counts)]
+    entries = kernel.Entries(*arrays)
+    kernel.search_kernel(trace.data, len(trace), entries, weights, LANES, early_stop, best, scratch)
+    return best, scratch

@@ -1,7 +1,6 @@
 """The compiled inner loop of the window search.
 
-The first call compiles it (one to two seconds) or loads it from numba's cache. Importing this
-module imports numba (a third of a second); so import it where it is used.
+Importing this module imports numba (a third of a second); so import it where it is used.
 
 The mismatch (window error) of a pair is (Zordan et al. 2007, section 5)
 
@@ -19,6 +18,7 @@ polynomial Q it needs no branch and no library call.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -39,24 +39,55 @@ _SLACK = np.float32(1.0001)
 _FLOOR = np.float32(1e-5)
 _ZERO = np.float32(0.0)
 
-_FLOATS = types.Array(types.float32, 1, "C", readonly=True)
-_WEIGHTS = types.Array(types.float32, 2, "C", readonly=True)
-_WINDOWS = types.Array(types.float32, 4, "C", readonly=True)
-_INTS = types.Array(types.int64, 1, "C", readonly=True)
+
+class Entries(NamedTuple):
+    """Windows of all reactions.
+
+    Attributes:
+        buffer: Windows of the reactions, each (frames, bodies, 7, entries padded), flat float32.
+        offsets: (reactions,) index in `buffer` at which each reaction begins.
+        counts: (reactions,) entries of each reaction without padding.
+    """
+
+    buffer: Any
+    offsets: Any
+    counts: Any
+
+
+class BodyWeights(NamedTuple):
+    """Weights of the mismatch, (frames, bodies) each: w_i wp_b of positions, w_i wt_b of angles."""
+
+    position: Any
+    angle: Any
+
+
+class Best(NamedTuple):
+    """The best pair of windows of every reaction.
+
+    Attributes:
+        errors: (reactions,) its mismatch [m].
+        exits: (reactions,) index of the exit; of equal mismatches the lowest exit, then the lowest
+            entry.
+        entries: (reactions,) index of the entry.
+    """
+
+    errors: Any
+    exits: Any
+    entries: Any
+
+
+_FLOATS, _INTS, _TABLE = types.float32[::1], types.int64[::1], types.float32[:, ::1]
+_FROZEN = types.Array(types.float32, 1, "C", readonly=True)
+_FROZEN_INTS = types.Array(types.int64, 1, "C", readonly=True)
 _SIGNATURE = types.void(
-    _WINDOWS,
+    types.Array(types.float32, 4, "C", readonly=True),
     types.int64,
-    _FLOATS,
-    _INTS,
-    _INTS,
-    _WEIGHTS,
-    _WEIGHTS,
+    types.BaseTuple.from_types((_FROZEN, _FROZEN_INTS, _FROZEN_INTS), Entries),
+    types.BaseTuple.from_types((_TABLE, _TABLE), BodyWeights),
     types.int64,
     types.boolean,
-    types.float32[::1],
-    types.int64[::1],
-    types.int64[::1],
-    types.float32[:, ::1],
+    types.BaseTuple.from_types((_FLOATS, _INTS, _INTS), Best),
+    _TABLE,
 )
 # No reassociation: the order of additions is fixed. The input has no NaN (`make_windows` checks).
 _FASTMATH = {"contract", "nnan", "nsz"}
@@ -76,21 +107,7 @@ def _difference(ax, ay, az, aw, ai, aj, ak, bx, by, bz, bw, bi, bj, bk, wp, wt):
 
 
 @compiled(_SIGNATURE, fastmath=_FASTMATH)
-def search_kernel(
-    trace,
-    exits,
-    buffer,
-    offsets,
-    counts,
-    position_weights,
-    angle_weights,
-    lanes,
-    early_stop,
-    best_errors,
-    best_exits,
-    best_entries,
-    errors,
-):
+def search_kernel(trace, exits, entries, weights, lanes, early_stop, found, errors):
     """Find the best pair of windows of every reaction.
 
     With `early_stop`, entries at both ends of an exit's row are skipped as soon as their sum so far
@@ -100,25 +117,21 @@ def search_kernel(
     Args:
         trace: (frames, bodies, 7, exits padded) float32.
         exits: Number of exits without padding.
-        buffer: Windows of the reactions, each (frames, bodies, 7, entries padded), flat float32.
-        offsets: (reactions,) index in `buffer` at which each reaction begins.
-        counts: (reactions,) entries of each reaction without padding.
-        position_weights: (frames, bodies), w_i wp_b.
-        angle_weights: (frames, bodies), w_i wt_b.
+        entries: `Entries`.
+        weights: `BodyWeights`.
         lanes: Windows are padded to a multiple of this; rows are cut at multiples of it.
         early_stop: Whether to skip pairs that cannot win.
-        best_errors: Out, (reactions,) [m].
-        best_exits: Out, (reactions,) index of the exit; of equal mismatches the lowest exit, then
-            the lowest entry.
-        best_entries: Out, (reactions,) index of the entry.
+        found: Out, `Best`.
         errors: Scratch, (exits, largest padded count); has all mismatches of the last reaction
             afterwards if `early_stop` is off.
     """
     frames, bodies = trace.shape[0], trace.shape[1]
+    buffer, offsets = entries.buffer, entries.offsets
+    position_weights, angle_weights = weights.position, weights.angle
     low = np.empty(exits, np.int64)
     high = np.empty(exits, np.int64)
     for r in range(len(offsets)):
-        count = counts[r]
+        count = entries.counts[r]
         padded = (count + lanes - 1) // lanes * lanes
         low[:] = 0
         high[:] = padded
@@ -178,10 +191,10 @@ def search_kernel(
                 low[s] = first // lanes * lanes
                 high[s] = (last + lanes - 1) // lanes * lanes if first < last else low[s]
         best = np.float32(np.inf)
-        best_exits[r], best_entries[r] = 0, 0
+        found.exits[r], found.entries[r] = 0, 0
         for s in range(exits):
             for m in range(low[s], min(high[s], count)):
                 if errors[s, m] < best:
                     best = errors[s, m]
-                    best_exits[r], best_entries[r] = s, m
-        best_errors[r] = best
+                    found.exits[r], found.entries[r] = s, m
+        found.errors[r] = best
