@@ -22,7 +22,7 @@ from dynresp.locomotion.graph.motion_graph import MotionGraph
 from dynresp.locomotion.graph.random_walk import check_in_component
 from dynresp.locomotion.playing.avatar_state import AvatarState
 from dynresp.locomotion.worlds.collisions import CollisionGrid
-from dynresp.locomotion.worlds.footprints import body_arrays, footprints
+from dynresp.locomotion.worlds.footprints import body_shape, footprints
 from dynresp.locomotion.worlds.paths import window_m
 from dynresp.motion.character import Character, default_character
 from dynresp.motion.rotations import FloatArray
@@ -110,7 +110,7 @@ class SearchGraph:
         self.ends = frozen(_ends(graph))
         self.still = frozen(_still(graph))
         self._planar = frozen(np.ascontiguousarray(database.planar[:, [0, 1, 3]]))
-        self._body = body_arrays(self.character)
+        self._body = body_shape(self.character)
         self._anywhere = frozen(np.ones(len(database), dtype=bool))
 
     def search(

@@ -195,15 +195,13 @@ def _enter(state, placement):
 @helper
 def _free(entry, stop, state, planar, feet, grid):
     """Whether no footprint of the frames entry to stop, as recorded, touches a box."""
-    corner, clearance, starts, members, boxes = grid
     cosine, sine = math.cos(state[YAW]), math.sin(state[YAW])
     for frame in range(entry, stop + 1):
         x = state[X] + cosine * planar[frame, 0] - sine * planar[frame, 1]
         y = state[Y] + sine * planar[frame, 0] + cosine * planar[frame, 1]
         yaw = state[YAW] + planar[frame, 2]
         if collides(
-            x, y, math.cos(yaw), math.sin(yaw), feet[frame], 0.0,
-            corner, clearance, starts, members, boxes,
+            x, y, math.cos(yaw), math.sin(yaw), feet[frame], 0.0, grid
         ):  # fmt: skip
             return False
     return True
@@ -215,7 +213,6 @@ def _plays_free(left, entry, stop, move, poses, velocities, playing, body, grid,
 
     `playing` is updated to the last of them.
     """
-    corner, clearance, starts, members, boxes = grid
     count = stop - entry + 1
     frames = np.empty(count + 1, np.int32)
     frames[0] = left
@@ -232,20 +229,21 @@ def _plays_free(left, entry, stop, move, poses, velocities, playing, body, grid,
         Blend(playing[PLACE:OFFSET], playing[OFFSET:RATE], playing[RATE:AGE], playing[AGE:PLAYED]),
         PlayedRows(played, np.empty((count, 4)), np.empty((count, 45))),
     )
-    states = (1, len(body[0]))
+    bodies = len(body.parents)
+    states = (1, bodies)
     positions, centers = np.empty((*states, 3)), np.empty((*states, 3))
-    quaternions, nowhere = np.empty((*states, 4)), np.zeros((len(body[0]), 3))
+    quaternions, nowhere = np.empty((*states, 4)), np.zeros((bodies, 3))
     feet = np.empty(4)
     for k in range(count):
         pose = played[k]
         kinematics_kernel(
-            played[k : k + 1], body[0], body[1], nowhere, positions, quaternions, centers
-        )
+            played[k : k + 1], body.parents, body.offsets, nowhere, positions, quaternions,
+            centers,
+        )  # fmt: skip
         footprint(pose, positions[0], quaternions[0], body, feet)
         yaw = 2.0 * math.atan2(pose[6], pose[3])
         if collides(
-            pose[0], pose[1], math.cos(yaw), math.sin(yaw), feet, settings.margin_m,
-            corner, clearance, starts, members, boxes,
+            pose[0], pose[1], math.cos(yaw), math.sin(yaw), feet, settings.margin_m, grid
         ):  # fmt: skip
             return False
     return True
@@ -274,11 +272,7 @@ _GRAPH = types.NamedTuple(
 _RESULT = types.NamedTuple((_INT[::1], _REAL[::1], _REAL[:, ::1], _INT, _INT, _INT), SearchResult)
 
 
-@compiled(
-    _RESULT(
-        _INT, REALS, REALS, _SETTINGS, _GRAPH, ROWS, REALS, types.Tuple(BODY), types.Tuple(GRID)
-    )
-)
+@compiled(_RESULT(_INT, REALS, REALS, _SETTINGS, _GRAPH, ROWS, REALS, BODY, GRID))
 def search_kernel(start, begin, playing, settings, graph, path, facing, body, grid):
     """Find the best sequence of edges from a state along a path.
 
@@ -290,8 +284,8 @@ def search_kernel(start, begin, playing, settings, graph, path, facing, body, gr
         graph: The graph.
         path: (p, 2) points, at least two [m].
         facing: (p,) c of eq. 8 along the path.
-        body: Of `body_arrays`.
-        grid: Arrays of a `CollisionGrid`; without boxes nothing is played or tested.
+        body: `BodyShape`.
+        grid: `Grid`; without boxes nothing is played or tested.
     """
     offsets, targets, distances = graph.offsets, graph.targets, graph.distances
     placements, planar, ends, still = graph.placements, graph.planar, graph.ends, graph.still
@@ -300,7 +294,7 @@ def search_kernel(start, begin, playing, settings, graph, path, facing, body, gr
     frames, parents, taken = np.empty(64, np.int64), np.empty(64, np.int64), np.empty(64, np.int64)
     states[0], played[0] = begin, playing
     frames[0], parents[0], taken[0] = start, -1, -1
-    boxes = grid[4]
+    boxes = grid.boxes
     known, best, least, arrival, collided = 1, 0, math.inf, np.int64(-1), 0
 
     size, costs, edges = 0, np.empty(4096), np.empty(4096, np.int64)

@@ -9,6 +9,7 @@ of the boxes that a body in the cell might touch. Far from all boxes the distanc
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -21,8 +22,29 @@ CLEARANCE = types.Array(types.float32, 2, "C", readonly=True)
 WINDOWS = types.Array(types.int64, 2, "C", readonly=True)
 LISTS = types.Array(types.int32, 1, "C", readonly=True)
 FOOTPRINTS = types.Array(types.float32, 2, "C", readonly=True)
-GRID = (REALS, CLEARANCE, LISTS, LISTS, ROWS)
-"""Types of the arrays of a `CollisionGrid`: frame, clearance, starts, members and boxes."""
+
+
+class Grid(NamedTuple):
+    """The arrays of a `CollisionGrid`.
+
+    Attributes:
+        frame: (3,) x and y of the grid's corner, side of its cells [m].
+        clearance: (columns, rows) distance from the middle of each cell to the nearest box, where
+            that is within reach [m].
+        starts: (columns * rows + 1,) where the boxes near each cell begin in `members`.
+        members: (k,) boxes.
+        boxes: (n, 6) rows of `World.boxes`.
+    """
+
+    frame: Any
+    clearance: Any
+    starts: Any
+    members: Any
+    boxes: Any
+
+
+GRID = types.BaseTuple.from_types((REALS, CLEARANCE, LISTS, LISTS, ROWS), Grid)
+"""Type of a `Grid`."""
 
 
 @helper(inline="always")
@@ -41,7 +63,7 @@ def _is_separate(x, y, cosine, sine, half_x, half_y, box):
 
 
 @helper
-def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, members, boxes):
+def collides(x, y, cosine, sine, footprint, margin, grid):
     """Whether a footprint, widened by a margin on all sides, overlaps a box or leaves the grid.
 
     Args:
@@ -51,13 +73,9 @@ def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, me
         sine: Of its yaw.
         footprint: (4,) least x, largest x, least y, largest y in the root's facing frame [m].
         margin: [m].
-        frame: (3,) x and y of the grid's corner, side of its cells [m].
-        clearance: (columns, rows) distance from the middle of each cell to the nearest box, where
-            that is within reach [m].
-        starts: (columns * rows + 1,) where the boxes near each cell begin in `members`.
-        members: (k,) boxes.
-        boxes: (n, 6) rows of `World.boxes`.
+        grid: `Grid`.
     """
+    frame, clearance = grid.frame, grid.clearance
     column = math.floor((x - frame[0]) / frame[2])
     row = math.floor((y - frame[1]) / frame[2])
     if column < 0 or row < 0 or column >= clearance.shape[0] or row >= clearance.shape[1]:
@@ -73,10 +91,9 @@ def collides(x, y, cosine, sine, footprint, margin, frame, clearance, starts, me
     middle_x = x + cosine * ahead - sine * aside
     middle_y = y + sine * ahead + cosine * aside
     cell = column * clearance.shape[1] + row
-    for member in range(starts[cell], starts[cell + 1]):
-        if not _is_separate(
-            middle_x, middle_y, cosine, sine, half_x, half_y, boxes[members[member]]
-        ):
+    for member in range(grid.starts[cell], grid.starts[cell + 1]):
+        box = grid.boxes[grid.members[member]]
+        if not _is_separate(middle_x, middle_y, cosine, sine, half_x, half_y, box):
             return True
     return False
 
@@ -140,20 +157,17 @@ def list_kernel(boxes, windows, frame, near, rows, free, members):
                     free[cell] += 1
 
 
-@compiled(types.void(ROWS, types.float64, *GRID, types.float64[::1]))
-def distances_kernel(points, max_distance, frame, clearance, starts, members, boxes, out):
+@compiled(types.void(ROWS, types.float64, GRID, types.float64[::1]))
+def distances_kernel(points, max_distance, grid, out):
     """Measure the distance of points to the nearest box.
 
     Args:
         points: (n, 2) [m].
         max_distance: Larger distances become this [m].
-        frame: Of the grid.
-        clearance: Of its cells.
-        starts: Of its lists.
-        members: Its lists.
-        boxes: Rows of `World.boxes`.
+        grid: `Grid`.
         out: Out, (n,) [m], negative inside.
     """
+    frame, clearance, boxes = grid.frame, grid.clearance, grid.boxes
     for i in range(len(points)):
         x, y = points[i, 0], points[i, 1]
         column = math.floor((x - frame[0]) / frame[2])
@@ -164,28 +178,24 @@ def distances_kernel(points, max_distance, frame, clearance, starts, members, bo
                 nearest = min(nearest, _distance(x, y, boxes[box]))
         else:
             cell = column * clearance.shape[1] + row
-            for member in range(starts[cell], starts[cell + 1]):
-                nearest = min(nearest, _distance(x, y, boxes[members[member]]))
+            for member in range(grid.starts[cell], grid.starts[cell + 1]):
+                nearest = min(nearest, _distance(x, y, boxes[grid.members[member]]))
         out[i] = nearest
 
 
-@compiled(types.void(ROWS, FOOTPRINTS, types.float64, *GRID, types.boolean[::1]))
-def collisions_kernel(roots, footprints, margin, frame, clearance, starts, members, boxes, out):
+@compiled(types.void(ROWS, FOOTPRINTS, types.float64, GRID, types.boolean[::1]))
+def collisions_kernel(roots, footprints, margin, grid, out):
     """Test many footprints.
 
     Args:
         roots: (n, 3) x, y [m] and yaw [rad].
-        footprints: (n, 4); see `collides`, and there the other arguments.
+        footprints: (n, 4); see `collides`.
         margin: [m].
-        frame: Of the grid.
-        clearance: Of its cells.
-        starts: Of its lists.
-        members: Its lists.
-        boxes: Rows of `World.boxes`.
+        grid: `Grid`.
         out: Out, (n,).
     """
     for i in range(len(roots)):
         out[i] = collides(
             roots[i, 0], roots[i, 1], math.cos(roots[i, 2]), math.sin(roots[i, 2]),
-            footprints[i], margin, frame, clearance, starts, members, boxes,
+            footprints[i], margin, grid,
         )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,9 @@ from dynresp.locomotion.worlds.obstacles import World
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
 from dynresp.support.errors import UsageError
+
+if TYPE_CHECKING:
+    from dynresp.locomotion.worlds.collision_kernel import Grid
 
 # Most boxes in the lists of all cells: 400 MB, and below 2^31, the limit of `CollisionGrid.starts`.
 _MAX_MEMBERS = 100_000_000
@@ -41,13 +45,15 @@ class CollisionGrid:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for array in self.arrays:
+        for array in (self.frame, self.clearance, self.starts, self.members, self.boxes):
             array.flags.writeable = False
 
     @property
-    def arrays(self) -> tuple[npt.NDArray, ...]:  # type: ignore[type-arg]
-        """The arguments of the kernels, in their order."""
-        return self.frame, self.clearance, self.starts, self.members, self.boxes
+    def arrays(self) -> Grid:
+        """The arrays, as the kernels take them."""
+        from dynresp.locomotion.worlds.collision_kernel import Grid
+
+        return Grid(self.frame, self.clearance, self.starts, self.members, self.boxes)
 
     @classmethod
     def of(cls, world: World, reach_m: float, cell_m: float = 0.2) -> CollisionGrid:
@@ -98,7 +104,7 @@ class CollisionGrid:
 
         at = np.ascontiguousarray(points, dtype=np.float64)
         out = np.empty(len(at))
-        distances_kernel(at, self.reach_m, *self.arrays, out)
+        distances_kernel(at, self.reach_m, self.arrays, out)
         return out
 
     def collisions(
@@ -120,7 +126,7 @@ class CollisionGrid:
         at = np.ascontiguousarray(roots, dtype=np.float64)
         reach = np.ascontiguousarray(footprints, dtype=np.float32)
         out = np.zeros(len(at), dtype=bool)
-        collisions_kernel(at, reach, margin_m, *self.arrays, out)
+        collisions_kernel(at, reach, margin_m, self.arrays, out)
         return out
 
 

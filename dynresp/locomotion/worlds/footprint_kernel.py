@@ -6,6 +6,7 @@ Importing this module imports numba; import it where it is used.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -15,8 +16,32 @@ from dynresp.support.compiling import compiled, helper
 
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 INTS = types.Array(types.int64, 1, "C", readonly=True)
-BODY = (INTS, ROWS, INTS, INTS, ROWS, ROWS, ROWS)
-"""Types of the arrays of `footprints.body_arrays`."""
+
+
+class BodyShape(NamedTuple):
+    """What the kernels need of a character.
+
+    Attributes:
+        parents: (bodies,) as of `Character`.
+        offsets: (bodies, 3) as of `Character`.
+        owners: (geoms,) the body to which each geom belongs.
+        kinds: (geoms,) MuJoCo's number of its shape.
+        sizes: (geoms, 3) its sizes [m].
+        centers: (geoms, 3) its centre in the body's frame [m].
+        turns: (geoms, 4) its orientation there, w x y z.
+    """
+
+    parents: Any
+    offsets: Any
+    owners: Any
+    kinds: Any
+    sizes: Any
+    centers: Any
+    turns: Any
+
+
+BODY = types.BaseTuple.from_types((INTS, ROWS, INTS, INTS, ROWS, ROWS, ROWS), BodyShape)
+"""Type of a `BodyShape`."""
 
 SPHERE, CAPSULE, BOX = 2, 3, 6
 """MuJoCo's numbers of the shapes that a body may have."""
@@ -39,10 +64,10 @@ def footprint(pose, positions, quaternions, body, out):
         pose: (59,).
         positions: (bodies, 3) origins of the bodies in that pose.
         quaternions: (bodies, 4) their orientations.
-        body: Of `body_arrays`.
+        body: `BodyShape`.
         out: Out, (4,) least x, largest x, least y, largest y in the root's facing frame [m].
     """
-    _, _, owners, kinds, sizes, centers, turns = body
+    owners, kinds, sizes = body.owners, body.kinds, body.sizes
     # The yaw of `rotations.yaw_of`, by the cosine and sine of its half.
     w, z = (pose[3], pose[6]) if pose[3] >= 0.0 else (-pose[3], -pose[6])
     length = math.sqrt(w * w + z * z)
@@ -51,12 +76,12 @@ def footprint(pose, positions, quaternions, body, out):
     out[0], out[1], out[2], out[3] = math.inf, -math.inf, math.inf, -math.inf
     axis, turn = np.empty(3), np.empty(4)
     for geom in range(len(owners)):
-        a, b = quaternions[owners[geom]], turns[geom]
+        a, b = quaternions[owners[geom]], body.turns[geom]
         turn[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
         turn[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
         turn[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
         turn[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
-        x, y = _level(a, centers[geom])
+        x, y = _level(a, body.centers[geom])
         x += positions[owners[geom], 0] - pose[0]
         y += positions[owners[geom], 1] - pose[1]
         half_x = half_y = 0.0
@@ -79,16 +104,16 @@ def footprint(pose, positions, quaternions, body, out):
         out[3] = max(out[3], aside + half_y)
 
 
-@compiled(types.void(ROWS, types.Tuple(BODY), types.float64[:, ::1]))
+@compiled(types.void(ROWS, BODY, types.float64[:, ::1]))
 def footprints_kernel(poses, body, out):
     """Write the footprints of many poses.
 
     Args:
         poses: (n, 59).
-        body: Of `body_arrays`.
+        body: `BodyShape`.
         out: Out, (n, 4); see `footprint`.
     """
-    parents, offsets = body[0], body[1]
+    parents, offsets = body.parents, body.offsets
     states = (1, len(parents))
     positions, centers = np.empty((*states, 3)), np.empty((*states, 3))
     quaternions = np.empty((*states, 4))

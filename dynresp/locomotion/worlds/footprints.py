@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.character import Character, as_poses
 from dynresp.motion.rotations import FloatArray
+from dynresp.support.arrays import frozen
+
+if TYPE_CHECKING:
+    from dynresp.locomotion.worlds.footprint_kernel import BodyShape
 
 
 def footprints(character: Character, poses: npt.ArrayLike) -> FloatArray:
@@ -28,25 +32,27 @@ def footprints(character: Character, poses: npt.ArrayLike) -> FloatArray:
 
     at = np.ascontiguousarray(as_poses(poses))
     out = np.empty((len(at), 4))
-    footprints_kernel(at, body_arrays(character), out)
+    footprints_kernel(at, body_shape(character), out)
     return out
 
 
-def body_arrays(character: Character) -> tuple[npt.NDArray[Any], ...]:
-    """What the kernels need of a character.
+def body_shape(character: Character) -> BodyShape:
+    """What the kernels need of a character."""
+    from dynresp.locomotion.worlds.footprint_kernel import BodyShape
 
-    Returns:
-        Parents (bodies,) and offsets (bodies, 3) of its bodies, as of `Character`; then for each
-        of its geoms the body it belongs to, its kind, size (3), centre (3) and orientation (4) in
-        that body's frame.
-    """
     model = character.model
-    return (
-        character.parents.astype(np.int64),
-        np.ascontiguousarray(character.offsets),
-        model.geom_bodyid.astype(np.int64) - 1,
-        model.geom_type.astype(np.int64),
-        np.array(model.geom_size),
-        np.array(model.geom_pos),
-        np.array(model.geom_quat),
+    return BodyShape(
+        *(
+            # The kernels' signatures know read-only arrays.
+            frozen(np.array(array, order="C"))
+            for array in (
+                character.parents.astype(np.int64),
+                character.offsets,
+                model.geom_bodyid.astype(np.int64) - 1,
+                model.geom_type.astype(np.int64),
+                model.geom_size,
+                model.geom_pos,
+                model.geom_quat,
+            )
+        )
     )
