@@ -10,6 +10,7 @@ wherever its row begins, so the result does not depend on how rows are divided a
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -43,20 +44,53 @@ _QUARTER = np.float32(0.5 * math.pi)
 # Pairs that are bounded at once: their data stays in the nearest cache.
 _RUN = 256
 
-_SIGNATURE = types.Tuple((types.int64[::1], types.int32[::1], types.float32[::1]))(
+
+class Groups(NamedTuple):
+    """How frames are stored: those of a group side by side, ascending.
+
+    Attributes:
+        place_of: (n,) place of each frame, -1 where it is in no group.
+        stops: (n,) one past the last place of each frame's group.
+        frame_of: (m,) frame at each place.
+    """
+
+    place_of: Any
+    stops: Any
+    frame_of: Any
+
+
+class PackedFrames(NamedTuple):
+    """The frames at their places.
+
+    Attributes:
+        bounds: (BOUND_SIZE, m) the bound vectors.
+        packed: (m, PARTS, LANES) the numbers of each frame.
+        yaws: (m,) yaw of the root [rad].
+        turned: (m, 4, 10) roots after none to three quarter turns: position, quaternion w x y z,
+            linear velocity. With blocks, `packed` has no root; otherwise this has no rows.
+        cell: (3,) size of a block [m].
+    """
+
+    bounds: Any
+    packed: Any
+    yaws: Any
+    turned: Any
+    cell: Any
+
+
+_LONGS, _SINGLES = types.int64[::1], types.float32[::1]
+_SIGNATURE = types.Tuple((_LONGS, types.int32[::1], _SINGLES))(
     types.int64,
     types.int64,
-    types.Array(types.int64, 1, "C", readonly=True),
-    types.Array(types.int64, 1, "C", readonly=True),
-    types.Array(types.int32, 1, "C", readonly=True),
-    types.Array(types.float32, 2, "C", readonly=True),
-    types.Array(types.float32, 3, "C", readonly=True),
-    types.Array(types.float32, 1, "C", readonly=True),
-    types.Array(types.float32, 3, "C", readonly=True),
-    types.Array(types.float32, 1, "C", readonly=True),
+    types.BaseTuple.from_types((_LONGS, _LONGS, types.int32[::1]), Groups),
+    types.BaseTuple.from_types(
+        (types.float32[:, ::1], types.float32[:, :, ::1], _SINGLES, types.float32[:, :, ::1],
+         _SINGLES),
+        PackedFrames,
+    ),
     types.float32,
     types.float32,
-)
+)  # fmt: skip
 _FASTMATH = {"contract", "nnan", "nsz", "reassoc"}
 
 
@@ -83,43 +117,24 @@ def _lower_bounds(bounds, own, start, count, sums):
 
 
 @compiled(_SIGNATURE, fastmath=_FASTMATH)
-def close_pairs(
-    first,
-    stop,
-    place_of,
-    group_stops,
-    frame_of,
-    bounds,
-    packed,
-    yaws,
-    turned,
-    cell,
-    max_bound,
-    max_distance,
-):
+def close_pairs(first, stop, groups, frames, max_bound, max_distance):
     """Pairs (i, j), i <= j, of frames of one group that are at most `max_distance` apart.
 
-    The frames of a group are stored side by side, ascending. A frame in no group has no pairs. The
-    first pair of every other frame is the one with itself.
+    A frame in no group has no pairs. The first pair of every other frame is the one with itself.
 
     Args:
         first: First row.
         stop: One past the last row.
-        place_of: (n,) place of each frame in the arrays below, -1 where it is in no group.
-        group_stops: (n,) one past the last place of each frame's group.
-        frame_of: (m,) frame at each place.
-        bounds: (BOUND_SIZE, m) the bound vectors.
-        packed: (m, PARTS, LANES) the numbers of each frame.
-        yaws: (m,) yaw of the root [rad].
-        turned: (m, 4, 10) roots after none to three quarter turns: position, quaternion w x y z,
-            linear velocity. With blocks, `packed` has no root; otherwise this has no rows.
-        cell: (3,) size of a block [m].
+        groups: `Groups`.
+        frames: `PackedFrames`.
         max_bound: Largest squared distance of bound vectors.
         max_distance: Largest distance of a pair.
 
     Returns:
         Where rows begin (stop - first + 1,), the frames j (pairs,), and the distances (pairs,).
     """
+    place_of, packed, turned = groups.place_of, frames.packed, frames.turned
+    bounds, yaws, cell = frames.bounds, frames.yaws, frames.cell
     offsets = np.zeros(stop - first + 1, np.int64)
     columns = np.empty(4096, np.int32)
     distances = np.empty(4096, np.float32)
@@ -135,8 +150,8 @@ def close_pairs(
             offsets[i - first + 1] = found
             continue
         a = packed[own]
-        for start in range(own, group_stops[i], _RUN):
-            count = min(_RUN, group_stops[i] - start)
+        for start in range(own, groups.stops[i], _RUN):
+            count = min(_RUN, groups.stops[i] - start)
             _lower_bounds(bounds, own, start, count, sums)
             left = 0
             for t in range(count):
@@ -163,7 +178,7 @@ def close_pairs(
                         offset -= cell[k] * np.rint(offset / cell[k])
                         speed = p[k + 7] - q[k + 7]
                         total += offset * offset + speed * speed
-                columns[found] = frame_of[place]
+                columns[found] = groups.frame_of[place]
                 distances[found] = total
                 found += total <= max_distance
         offsets[i - first + 1] = found

@@ -172,16 +172,23 @@ class _Search:
 
     def jumps(self, rows: tuple[int, int]) -> _Lot:
         """Pairs of steps that the rules leave in some rows of the matrix."""
-        from dynresp.locomotion.graph.frame_distance_kernel import close_pairs
+        from dynresp.locomotion.graph.frame_distance_kernel import (
+            Groups,
+            PackedFrames,
+            close_pairs,
+        )
         from dynresp.locomotion.graph.pruning_kernel import keep_best_of_neighbours
 
         # One more row on both sides, which has neighbours of the pairs.
         first, stop = max(rows[0] - 1, 0), min(rows[1] + 1, len(self.clip_of))
         offsets, second, distances = close_pairs(
-            first, stop, self.place_of, self.group_stops, self.frame_of, self.bounds, self.packed,
-            self.yaws, self.turned, self.cell, self.max_distance * _SLACK + _FLOOR,
+            first,
+            stop,
+            Groups(self.place_of, self.group_stops, self.frame_of),
+            PackedFrames(self.bounds, self.packed, self.yaws, self.turned, self.cell),
+            self.max_distance * _SLACK + _FLOOR,
             self.max_distance,
-        )  # fmt: skip
+        )
         own = slice(offsets[rows[0] - first], offsets[rows[1] - first])
         frames = np.arange(first, stop, dtype=np.int32)
         sources = np.repeat(frames, np.diff(offsets))
