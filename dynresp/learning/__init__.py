@@ -1,1 +1,1 @@
-"""Learning which reaction the oracle would choose: training, and judging what was trained."""
+"""Learning which reaction the full search would choose: training, and judging what was trained."""
