@@ -27,9 +27,9 @@ from numba.core import event
 from dynresp.support.paths import PACKAGE_FOLDER
 from dynresp.support.progress import announce
 
-_PATIENCE = 200_000
-"""Numbers in the arguments of calls that Python runs before a kernel is compiled: some 20 hits, a
-second."""
+_PATIENCE = 50_000
+"""Numbers in the arguments of calls that Python runs before a kernel is compiled: some ten hits, or
+a third of a second."""
 
 _LOCK = threading.RLock()
 """One for all kernels: compiling one may compile others."""

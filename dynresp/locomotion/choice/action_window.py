@@ -12,7 +12,7 @@ import numpy as np
 
 from dynresp.motion.rotations import FloatArray
 from dynresp.support.arrays import BoolArray
-from dynresp.support.errors import UsageError
+from dynresp.support.checks import check_number
 
 
 class Area(Protocol):
@@ -72,11 +72,7 @@ class ActionWindow:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if self.count < 1:
-            raise UsageError(f"count must be 1 or more, got {self.count}")
-        if not 0.0 <= self.earliest_s < np.inf:
-            raise UsageError(f"earliest_s must be 0 or more, got {self.earliest_s}")
-        if self.latest_s is not None and not self.earliest_s < self.latest_s < np.inf:
-            raise UsageError(
-                f"latest_s must be above earliest_s = {self.earliest_s}, got {self.latest_s}"
-            )
+        check_number("count", self.count, 1, whole=True)
+        check_number("earliest_s", self.earliest_s, 0.0, unit="s")
+        if self.latest_s is not None:
+            check_number("latest_s", self.latest_s, self.earliest_s, unit="s", above_low=True)

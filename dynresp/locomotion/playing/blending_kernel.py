@@ -132,14 +132,14 @@ def _turn_between(a, b, out):
 
 
 @helper(inline="always")
-def _move(place, dx, dy, dz, turn):
+def _move(placement, dx, dy, dz, turn):
     """Move a placement (in place) by another, which is relative to it."""
-    cosine, sine = math.cos(place[3]), math.sin(place[3])
-    place[0] += cosine * dx - sine * dy
-    place[1] += sine * dx + cosine * dy
-    place[2] += dz
-    yaw = place[3] + turn
-    place[3] = yaw - 2.0 * math.pi * math.ceil(yaw / (2.0 * math.pi) - 0.5)
+    cosine, sine = math.cos(placement[3]), math.sin(placement[3])
+    placement[0] += cosine * dx - sine * dy
+    placement[1] += sine * dx + cosine * dy
+    placement[2] += dz
+    yaw = placement[3] + turn
+    placement[3] = yaw - 2.0 * math.pi * math.ceil(yaw / (2.0 * math.pi) - 0.5)
 
 
 @helper
@@ -163,13 +163,13 @@ def _decay(offset, rate, age, blend_s, rate_s):
 
 
 @helper
-def _put(pose, place, offset, out):
+def _put(pose, placement, offset, out):
     """A recorded pose, placed and displaced."""
-    cosine, sine = math.cos(place[3]), math.sin(place[3])
-    out[0] = place[0] + cosine * pose[0] - sine * pose[1] + offset[0]
-    out[1] = place[1] + sine * pose[0] + cosine * pose[1] + offset[1]
-    out[2] = place[2] + pose[2] + offset[2]
-    _turn(place[3], pose[3:7], out[3:7])
+    cosine, sine = math.cos(placement[3]), math.sin(placement[3])
+    out[0] = placement[0] + cosine * pose[0] - sine * pose[1] + offset[0]
+    out[1] = placement[1] + sine * pose[0] + cosine * pose[1] + offset[1]
+    out[2] = placement[2] + pose[2] + offset[2]
+    _turn(placement[3], pose[3:7], out[3:7])
     for i in range(7, 59):
         out[i] = pose[i]
     for joint in range(14):
@@ -219,9 +219,9 @@ def _turned_back(x, y, z, v, out):
 
 
 @helper
-def _put_velocity(velocity, place, offset, rate, out):
+def _put_velocity(velocity, placement, offset, rate, out):
     """The velocity of a recorded frame, placed and displaced."""
-    cosine, sine = math.cos(place[3]), math.sin(place[3])
+    cosine, sine = math.cos(placement[3]), math.sin(placement[3])
     out[0] = cosine * velocity[0] - sine * velocity[1] + rate[0]
     out[1] = sine * velocity[0] + cosine * velocity[1] + rate[1]
     out[2] = velocity[2] + rate[2]
@@ -235,12 +235,12 @@ def _put_velocity(velocity, place, offset, rate, out):
 
 
 @helper
-def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
+def _displace(pose, velocity, placement, recorded, its_velocity, offset, rate):
     """The displacement that turns a placed frame into a given pose with a given velocity."""
-    cosine, sine = math.cos(place[3]), math.sin(place[3])
-    offset[0] = pose[0] - (place[0] + cosine * recorded[0] - sine * recorded[1])
-    offset[1] = pose[1] - (place[1] + sine * recorded[0] + cosine * recorded[1])
-    offset[2] = pose[2] - (place[2] + recorded[2])
+    cosine, sine = math.cos(placement[3]), math.sin(placement[3])
+    offset[0] = pose[0] - (placement[0] + cosine * recorded[0] - sine * recorded[1])
+    offset[1] = pose[1] - (placement[1] + sine * recorded[0] + cosine * recorded[1])
+    offset[2] = pose[2] - (placement[2] + recorded[2])
     rate[0] = velocity[0] - (cosine * its_velocity[0] - sine * its_velocity[1])
     rate[1] = velocity[1] - (sine * its_velocity[0] + cosine * its_velocity[1])
     rate[2] = velocity[2] - its_velocity[2]
@@ -250,7 +250,7 @@ def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
         for i in range(4):
             turned[i] = recorded[q + i]
         if joint == 0:
-            _turn(place[3], turned, turned)
+            _turn(placement[3], turned, turned)
         _turn_between(turned, pose[q : q + 4], offset[at : at + 3])
         x, y, z = offset[at], offset[at + 1], offset[at + 2]
         _turned_back(x, y, z, its_velocity[at : at + 3], beyond)
@@ -260,19 +260,19 @@ def _displace(pose, velocity, place, recorded, its_velocity, offset, rate):
 
 
 @compiled(_DISPLACE)
-def displacement_kernel(pose, velocity, place, recorded, its_velocity, offset, rate):
+def displacement_kernel(pose, velocity, placement, recorded, its_velocity, offset, rate):
     """Write the displacement that turns a placed frame into a given pose with a given velocity.
 
     Args:
         pose: (59,) the pose.
         velocity: (45,) its velocity.
-        place: (4,) placement of the frame.
+        placement: (4,) placement of the frame.
         recorded: (59,) the frame, in its own world.
         its_velocity: (45,) velocity of the frame, in its own world.
         offset: Out, (45,) see `Blend`.
         rate: Out, (45,) see `Blend`.
     """
-    _displace(pose, velocity, place, recorded, its_velocity, offset, rate)
+    _displace(pose, velocity, placement, recorded, its_velocity, offset, rate)
 
 
 @compiled(_PLAY)
@@ -288,7 +288,7 @@ def play_kernel(recording, steps, times, blend, played):
     """
     poses, velocities = recording
     frames, jumps, moves = steps
-    place, offset, rate, age = blend
+    placement, offset, rate, age = blend
     pose, velocity = np.empty(59), np.empty(45)
     now, its_rate = np.empty(45), np.empty(45)
     for k in range(len(jumps)):
@@ -299,10 +299,12 @@ def play_kernel(recording, steps, times, blend, played):
             left = frames[k]
             now[:], its_rate[:] = offset, rate
             _decay(now, its_rate, age[0], times.blend_s, times.rate_s)
-            _put(poses[left], place, now, pose)
-            _put_velocity(velocities[left], place, now, its_rate, velocity)
-            _move(place, moves[k, 0], moves[k, 1], moves[k, 2], moves[k, 3])
-            _displace(pose, velocity, place, poses[frame - 1], velocities[frame - 1], offset, rate)
+            _put(poses[left], placement, now, pose)
+            _put_velocity(velocities[left], placement, now, its_rate, velocity)
+            _move(placement, moves[k, 0], moves[k, 1], moves[k, 2], moves[k, 3])
+            _displace(
+                pose, velocity, placement, poses[frame - 1], velocities[frame - 1], offset, rate
+            )
             age[0] = 0.0
         age[0] += 1.0 / times.fps
         if age[0] < times.blend_s:
@@ -310,7 +312,7 @@ def play_kernel(recording, steps, times, blend, played):
             _decay(now, its_rate, age[0], times.blend_s, times.rate_s)
         else:
             now[:], its_rate[:] = 0.0, 0.0
-        _put(poses[frame], place, now, played.poses[k])
-        _put_velocity(velocities[frame], place, now, its_rate, played.velocities[k])
+        _put(poses[frame], placement, now, played.poses[k])
+        _put_velocity(velocities[frame], placement, now, its_rate, played.velocities[k])
         for i in range(4):
-            played.placements[k, i] = place[i]
+            played.placements[k, i] = placement[i]

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from dynresp.locomotion.vision.segmentation import Mask
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.errors import UsageError
+from dynresp.support.checks import check_number
 from dynresp.support.extras import require
 
 # The grid: rows and columns, and how far it reaches from the centre up and aside [radii].
@@ -72,16 +72,11 @@ class FeatureConfig:
         Raises:
             UsageError: One of them is out of range.
         """
-        if not 1 <= self.components <= _GRID[0] * _GRID[1]:
-            raise UsageError(
-                f"components must be 1 to {_GRID[0] * _GRID[1]}, got {self.components}"
-            )
+        check_number("components", self.components, 1, _GRID[0] * _GRID[1], whole=True)
         for name in ("span_s", "distance_m"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise UsageError(f"{name} must be above 0, got {getattr(self, name)}")
+            check_number(name, getattr(self, name), 0.0, above_low=True)
         for name in ("shape_weight", "speed_weight", "growth_weight"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise UsageError(f"{name} must be 0 or more, got {getattr(self, name)}")
+            check_number(name, getattr(self, name), 0.0)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from dynresp.motion import rotations
 from dynresp.motion.character import ROOT, ROOT_QUAT
 from dynresp.motion.motion import move_poses
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.errors import UsageError
+from dynresp.support.checks import check_number
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,7 @@ class TransitionConfig:
         Raises:
             UsageError: It is not positive.
         """
-        if not (np.isfinite(self.blend_s) and self.blend_s > 0):
-            raise UsageError(f"blend_s must be above 0, got {self.blend_s}")
+        check_number("blend_s", self.blend_s, 0.0, unit="s", above_low=True)
 
     def blend_frames(self, fps: float) -> int:
         """Number of frames from the exit, still simulated, to the first frame of reaction alone."""
