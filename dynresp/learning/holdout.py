@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from dynresp.motion.rotations import FloatArray
-from dynresp.support.checks import check_number
 from dynresp.support.errors import UsageError
 
 IndexArray = npt.NDArray[np.intp]
@@ -46,7 +45,8 @@ class Split:
             raise UsageError(
                 f"the share held out must be at least 0 and below 1, got {self.held_out:g}"
             )
-        check_number("the seed", self.seed, 0, 2**63 - 1, whole=True)
+        if not 0 <= self.seed < 2**63:
+            raise UsageError(f"the seed must be from 0 to 2^63 - 1, got {self.seed}")
 
     def is_held_out(self, index: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Whether samples are held out.

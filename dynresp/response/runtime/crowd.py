@@ -96,6 +96,7 @@ class Crowd:
                 )
         if chooser is not None:
             _check_chooser(chooser, character, library, self.config)
+        _compile_kernels()
         self.responders = tuple(
             DynamicResponder(base, character, self.config.physics) for base in bases
         )
@@ -286,3 +287,14 @@ def _check_chooser(
                 f"the chooser was made with another {what} than the crowd; make it with the "
                 "character, the library and the config of the crowd"
             )
+
+
+def _compile_kernels() -> None:
+    """Compile what a hit needs, or load it: no frame is to wait for that, or for Python."""
+    from dynresp.motion.feet.foot_fitting_kernel import correct_kernel
+    from dynresp.motion.feet.skating_kernel import slides_kernel
+    from dynresp.response.alignment.alignment_kernel import align_kernel, errors_kernel
+    from dynresp.response.prediction.hit_features_kernel import features_kernel
+
+    for kernel in (features_kernel, errors_kernel, align_kernel, slides_kernel, correct_kernel):
+        kernel.compiled()

@@ -366,3 +366,14 @@ def test_a_character_can_be_hit_after_playing_for_long(
     for _ in range(40):
         crowd.advance()
     assert EventKind.CHOSEN in _kinds(responder)
+
+
+def test_nothing_is_compiled_or_interpreted_in_a_frame(character: Character) -> None:
+    from dynresp.motion.feet.foot_fitting_kernel import correct_kernel
+    from dynresp.motion.feet.skating_kernel import slides_kernel
+    from dynresp.response.prediction.hit_features_kernel import features_kernel
+
+    walk = walking(character)
+    _crowd(character, tiny_library(step=walk), walk)
+    for kernel in (features_kernel, slides_kernel, correct_kernel):
+        assert kernel._compiled is not None
